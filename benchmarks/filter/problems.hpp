@@ -1,0 +1,140 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The problems of the filter scoreboard, written once as models of cairn; rivals take their matrices.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include <cairn/core/random.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/structure.hpp>
+#include <cairn/manifold/product.hpp>
+#include <cairn/manifold/so2.hpp>
+#include <cairn/models/motion.hpp>
+#include <cairn/models/sensor.hpp>
+
+namespace cairn_bench {
+
+inline constexpr double time_step = 0.1;
+
+/// Measurements to cycle through: N(0, sigma).
+template <int M>
+std::vector<cairn::Vector<M>> noise(std::size_t count, double sigma) {
+  cairn::Random random(7);
+  std::vector<cairn::Vector<M>> z(count);
+  for (auto& v : z)
+    for (int i = 0; i < M; ++i) v(i) = sigma * random.normal();
+  return z;
+}
+
+/// Landmark: stands still, is seen directly.
+struct Still {
+  using State = cairn::Vector<3>;
+  using Control = cairn::NoControl;
+  static constexpr bool linear = true;
+  cairn::Matrix<3> q = 1e-3 * cairn::Matrix<3>::Identity();
+  [[nodiscard]] const State& propagate(const State& x, const Control&, double) const { return x; }
+  [[nodiscard]] cairn::Identity<3> jacobian(const State&, const Control&, double) const { return {}; }
+  [[nodiscard]] const cairn::Matrix<3>& noise(const State&, const Control&, double) const { return q; }
+};
+
+/// (x, y, heading, speed, turn rate) along the tangent, and a beacon at (10, 5).
+struct Vehicle {
+  using State = cairn::Vector<5>;
+  using Control = cairn::NoControl;
+  [[nodiscard]] State propagate(const State& x, const Control&, double dt) const {
+    State next = x;
+    next(0) += dt * x(3) * std::cos(x(2));
+    next(1) += dt * x(3) * std::sin(x(2));
+    next(2) += dt * x(4);
+    return next;
+  }
+  [[nodiscard]] cairn::Structured<"1.**. .1**. ..1.* ...1. ....1"> jacobian(const State& x, const Control&,
+                                                                            double dt) const {
+    const double c = std::cos(x(2)), s = std::sin(x(2));
+    return {{-dt * x(3) * s, dt * c, dt * x(3) * c, dt * s, dt}};
+  }
+  [[nodiscard]] cairn::Matrix<5> noise(const State&, const Control&, double) const {
+    return (cairn::Vector<5>() << 1e-4, 1e-4, 1e-5, 1e-2, 1e-3).finished().asDiagonal();
+  }
+};
+struct Beacon {
+  using State = cairn::Vector<5>;
+  using Measurement = cairn::Product<cairn::Vector<1>, cairn::SO2>;
+  [[nodiscard]] Measurement predict(const State& x) const {
+    const double dx = 10.0 - x(0), dy = 5.0 - x(1);
+    return Measurement(cairn::Vector<1>(std::sqrt(dx * dx + dy * dy)), cairn::SO2(std::atan2(dy, dx) - x(2)));
+  }
+  [[nodiscard]] cairn::Structured<"**... ***.."> jacobian(const State& x) const {
+    const double dx = 10.0 - x(0), dy = 5.0 - x(1);
+    const double squared = dx * dx + dy * dy, range = std::sqrt(squared);
+    return {{-dx / range, -dy / range, dy / squared, -dx / squared, -1.0}};
+  }
+  [[nodiscard]] cairn::Matrix<2> noise(const State&) const {
+    return cairn::Vector<2>(0.01, 1e-3).asDiagonal();
+  }
+};
+
+/// Nine states, three of them driven by sines of the others; three squared distances seen.
+struct Coupled {
+  using State = cairn::Vector<9>;
+  using Control = cairn::NoControl;
+  [[nodiscard]] State propagate(const State& x, const Control&, double dt) const {
+    State next = x;
+    for (int i = 0; i < 3; ++i) {
+      next(i) += dt * x(3 + i);
+      next(3 + i) += dt * x(6 + i);
+      next(6 + i) -= dt * std::sin(x(i));
+    }
+    return next;
+  }
+  [[nodiscard]] cairn::Matrix<9> noise(const State&, const Control&, double) const {
+    return 1e-3 * cairn::Matrix<9>::Identity();
+  }
+};
+struct CoupledSensor {
+  using State = cairn::Vector<9>;
+  using Measurement = cairn::Vector<3>;
+  [[nodiscard]] Measurement predict(const State& x) const {
+    return {x(0) + 0.1 * x(1) * x(1), x(1) + 0.1 * x(2) * x(2), x(2) + 0.1 * x(0) * x(0)};
+  }
+  [[nodiscard]] cairn::Matrix<3> noise(const State&) const { return 0.1 * cairn::Matrix<3>::Identity(); }
+};
+
+/// Inertial error state: position, velocity, attitude, accelerometer and gyroscope bias; position and
+/// velocity are seen. The attitude turns the biases.
+struct Inertial {
+  using State = cairn::Vector<15>;
+  using Control = cairn::NoControl;
+  using Jacobian = cairn::Structured<
+      "1..*........... .1..*.......... ..1..*......... ...1...*****... ....1.*.****... .....1**.***... "
+      "......1.....*** .......1....*** ........1...*** .........1..... ..........1.... ...........1... "
+      "............1.. .............1. ..............1">;
+  [[nodiscard]] State propagate(const State& x, const Control& u, double dt) const {
+    return jacobian(x, u, dt).dense() * x;
+  }
+  [[nodiscard]] Jacobian jacobian(const State& x, const Control&, double dt) const {
+    const double c = std::cos(x(8)), s = std::sin(x(8)), g = 9.81 * dt;
+    const double r[3][3] = {{c, -s, 0}, {s, c, 0}, {0, 0, 1}};
+    Jacobian f;
+    std::size_t k = 0;
+    for (int i = 0; i < 3; ++i) f.values[k++] = dt;
+    for (int i = 0; i < 3; ++i) {
+      f.values[k++] = i == 1 ? g : -g;  // the lever of gravity on attitude
+      f.values[k++] = 0.1 * g;
+      for (int j = 0; j < 3; ++j) f.values[k++] = -r[i][j] * dt;
+    }
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) f.values[k++] = -r[i][j] * dt;
+    return f;
+  }
+  [[nodiscard]] cairn::Matrix<15> noise(const State&, const Control&, double) const {
+    return 1e-4 * cairn::Matrix<15>::Identity();
+  }
+};
+
+}  // namespace cairn_bench

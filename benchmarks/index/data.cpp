@@ -1,0 +1,108 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "data.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+
+#include <cairn/core/random.hpp>
+
+#include "support/data.hpp"
+
+namespace cairn_bench {
+namespace {
+
+constexpr double pi = 3.14159265358979323846;
+
+/// A beam of a scanner 2 m above a street 20 m wide, with walls: where it ends, with 2 cm of noise.
+Point3 scan_point(cairn::Random& random) {
+  const double elevation = (-24.8 + 26.8 * static_cast<double>(random.below(64)) / 63) * pi / 180;
+  const double azimuth = random.uniform(-pi, pi);
+  const double to_wall = 10 / std::max(std::abs(std::sin(azimuth)), 0.1);
+  const double to_ground = elevation < 0 ? 2 / std::tan(-elevation) : 1e9;
+  const double range = std::min(to_wall, to_ground) + random.normal(0, 0.02);
+  return {static_cast<float>(range * std::cos(azimuth)), static_cast<float>(range * std::sin(azimuth)),
+          static_cast<float>(range * std::tan(elevation))};
+}
+
+void normalise(float* row, std::size_t dim) {
+  double sum = 0;
+  for (std::size_t a = 0; a < dim; ++a) sum += double{row[a]} * double{row[a]};
+  for (std::size_t a = 0; a < dim; ++a) row[a] = static_cast<float>(row[a] / std::sqrt(sum));
+}
+
+std::vector<float> read_bvecs(const std::filesystem::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::vector<float> rows;
+  std::vector<std::uint8_t> row;
+  std::int32_t dim = 0;
+  while (file.read(reinterpret_cast<char*>(&dim), 4)) {
+    row.resize(static_cast<std::size_t>(dim));
+    file.read(reinterpret_cast<char*>(row.data()), dim);
+    rows.insert(rows.end(), row.begin(), row.end());
+  }
+  return rows;
+}
+
+}  // namespace
+
+std::vector<Point3> points_like(const std::string& shape, std::size_t count, std::uint64_t seed) {
+  cairn::Random random(seed);
+  std::vector<Point3> points(count);
+  for (Point3& point : points) {
+    if (shape == "scan") {
+      point = scan_point(random);
+      continue;
+    }
+    const double along = random.uniform();
+    for (float& number : point) {
+      number = static_cast<float>(random.uniform());
+      if (shape == "line") number = static_cast<float>(along);
+      if (shape == "equal") number = 0.5F;
+      if (shape == "lattice") number = static_cast<float>(random.below(64)) / 64;
+      if (shape == "duplicates") number = static_cast<float>(random.below(10)) / 10;
+    }
+  }
+  return points;
+}
+
+std::vector<float> clustered_descriptors(std::size_t count, std::uint64_t seed) {
+  constexpr std::size_t dim = 64;
+  cairn::Random random(99);  // the world's clusters are always the same
+  std::vector<float> centres(300 * dim);
+  for (std::size_t i = 0; i < centres.size(); ++i)
+    centres[i] = static_cast<float>(random.normal(0, 1.0 / (1.0 + 0.1 * static_cast<double>(i % dim))));
+  cairn::Random draw(seed, 1);
+  std::vector<float> rows(count * dim);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t centre = draw.below(300);
+    for (std::size_t a = 0; a < dim; ++a)
+      rows[i * dim + a] = centres[centre * dim + a] +
+                          static_cast<float>(draw.normal(0, 0.6 / (1.0 + 0.1 * static_cast<double>(a))));
+    normalise(&rows[i * dim], dim);
+  }
+  return rows;
+}
+
+std::vector<float> noisy_copies(const std::vector<float>& of, std::size_t count, std::uint64_t seed) {
+  constexpr std::size_t dim = 64;
+  cairn::Random random(seed, 2);
+  std::vector<float> queries = clustered_descriptors(count, seed + 1000);
+  for (std::size_t i = 0; i < count; i += 2) {
+    const std::size_t source = random.below(of.size() / dim);
+    for (std::size_t a = 0; a < dim; ++a)
+      queries[i * dim + a] = of[source * dim + a] + static_cast<float>(random.normal(0, 0.02));
+    normalise(&queries[i * dim], dim);
+  }
+  return queries;
+}
+
+std::optional<Descriptors> sift() {
+  const auto folder = cairn_test::real_data("sift_99k");
+  if (!folder) return std::nullopt;
+  return Descriptors{128, read_bvecs(*folder / "base.bvecs"), read_bvecs(*folder / "query.bvecs")};
+}
+
+}  // namespace cairn_bench

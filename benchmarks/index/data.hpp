@@ -1,0 +1,37 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The point sets of the index benchmarks, seeded, and real SIFT descriptors where they are at hand.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace cairn_bench {
+
+using Point3 = std::array<float, 3>;
+
+/// "uniform" in the unit cube, "scan" (rings of a turning 64-beam scanner in a street), "line", "equal",
+/// "lattice" (16^3 places), "duplicates" (each place holds about a thousand points).
+std::vector<Point3> points_like(const std::string& shape, std::size_t count, std::uint64_t seed);
+
+/// Descriptors of 64 numbers and unit length in clusters, as those of real images are.
+std::vector<float> clustered_descriptors(std::size_t count, std::uint64_t seed);
+
+/// Each of `of` (64 numbers) with noise; the rest of the queries, one in two, are new descriptors.
+std::vector<float> noisy_copies(const std::vector<float>& of, std::size_t count, std::uint64_t seed);
+
+struct Descriptors {
+  std::size_t dim;
+  std::vector<float> base;
+  std::vector<float> queries;
+};
+/// 99,000 SIFT descriptors and 1,000 queries.
+std::optional<Descriptors> sift();
+
+}  // namespace cairn_bench

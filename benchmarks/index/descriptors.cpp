@@ -1,0 +1,188 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/core/parallel.hpp>
+#include <cairn/index/best_bin_first.hpp>
+#include <cairn/index/principal_axes.hpp>
+
+#include "areas.hpp"
+#include "rivals.hpp"
+
+namespace cairn_bench {
+namespace {
+
+constexpr float ratio_of_test = 1.25F;  // Lowe's 0.8
+
+/// cairn over descriptors of Dim numbers: turned, one tree, a budget of leaves.
+template <std::size_t Dim>
+class Ours {
+public:
+  using Tree = cairn::KdTree<float, Dim>;
+
+  explicit Ours(const std::vector<float>& base) : axes_(cairn::Rows<float>(base, Dim)) {
+    std::vector<float> turned(base.size());
+    for (std::size_t i = 0; i < base.size(); i += Dim) axes_.turn(&base[i], &turned[i]);
+    tree_ = Tree::from_rows(turned, Dim);
+  }
+
+  [[nodiscard]] std::vector<TwoNearest> search(const std::vector<float>& queries, std::size_t leaves,
+                                               unsigned threads = 1) const {
+    std::vector<TwoNearest> found(queries.size() / Dim);
+    cairn::parallel_for(found.size(), threads, [&](std::size_t begin, std::size_t end) {
+      cairn::BestBinFirst<Tree> search;
+      const Tree* const trees[] = {&tree_};
+      float turned[Dim];
+      for (std::size_t i = begin; i < end; ++i) {
+        axes_.turn(&queries[i * Dim], turned);
+        cairn::NearestTwo<float> two;
+        search.search(std::span<const Tree* const>(trees), turned, two, {.leaves = leaves});
+        found[i] = {two.id(), std::sqrt(two.first()), std::sqrt(two.second())};
+      }
+    });
+    return found;
+  }
+
+private:
+  cairn::PrincipalAxes axes_;
+  Tree tree_;
+};
+
+/// Exact search as a product of matrices, 128 queries at a time.
+std::vector<TwoNearest> search_by_product(const std::vector<float>& base, const std::vector<float>& queries,
+                                          std::size_t dim) {
+  using Matrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic>;
+  const auto rows = static_cast<Eigen::Index>(dim);
+  const Eigen::Map<const Matrix> points(base.data(), rows, static_cast<Eigen::Index>(base.size() / dim));
+  const Eigen::VectorXf squares = points.colwise().squaredNorm().transpose();
+  std::vector<TwoNearest> found;
+  const std::size_t count = queries.size() / dim;
+  for (std::size_t begin = 0; begin < count; begin += 128) {
+    const auto size = static_cast<Eigen::Index>(std::min<std::size_t>(128, count - begin));
+    const Eigen::Map<const Matrix> block(queries.data() + begin * dim, rows, size);
+    const Matrix products = points.transpose() * block;
+    for (Eigen::Index q = 0; q < size; ++q) {
+      const float own = block.col(q).squaredNorm();
+      cairn::NearestTwo<float> two;
+      for (Eigen::Index i = 0; i < squares.size(); ++i)
+        two.offer(static_cast<cairn::PointId>(i), squares(i) - 2 * products(i, q));
+      found.push_back(
+          {two.id(), std::sqrt(std::max(0.0F, two.first() + own)), std::sqrt(two.second() + own)});
+    }
+  }
+  return found;
+}
+
+bool accepted(const TwoNearest& two) {
+  return two.second >= ratio_of_test * two.first;
+}
+
+/// Share of the exact search's ratio-test matches that were found, and of its nearest neighbours.
+struct Quality {
+  double matches;
+  double nearest;
+};
+Quality quality(const std::vector<TwoNearest>& exact, const std::vector<TwoNearest>& found) {
+  double matches = 0;
+  double kept = 0;
+  double nearest = 0;
+  for (std::size_t i = 0; i < exact.size(); ++i) {
+    nearest += found[i].first <= exact[i].first * 1.00001F;
+    if (!accepted(exact[i])) continue;
+    ++matches;
+    kept += accepted(found[i]) && found[i].id == exact[i].id;
+  }
+  return {kept / matches, nearest / static_cast<double>(exact.size())};
+}
+
+/// The smallest budget on a grid of quarter powers of two that reaches the mark; 0 where none does.
+template <class Search>
+std::size_t budget_for(const Search& search, const std::vector<TwoNearest>& exact, double mark,
+                       bool of_matches, std::size_t most) {
+  for (double budget = 2; budget <= static_cast<double>(most); budget *= std::sqrt(std::sqrt(2.0))) {
+    const Quality reached = quality(exact, search(static_cast<std::size_t>(budget)));
+    if ((of_matches ? reached.matches : reached.nearest) >= mark) return static_cast<std::size_t>(budget);
+  }
+  return 0;
+}
+
+template <std::size_t Dim>
+void score_mark(Scoreboard& board, const std::string& name, const std::vector<float>& base,
+                const std::vector<float>& queries, double mark, bool of_matches, double must, double aim) {
+  const Ours<Dim> ours(base);
+  const auto exact = search_by_product(base, queries, Dim);
+  const auto our_search = [&](std::size_t leaves) { return ours.search(queries, leaves); };
+  const std::size_t leaves = budget_for(our_search, exact, mark, of_matches, base.size() / Dim / 8);
+  const double count = static_cast<double>(queries.size() / Dim);
+  std::vector<Contender> contenders{
+      {"cairn", [&] { do_not_optimise(our_search(leaves)); }, count},
+      {"matrix product", [&] { do_not_optimise(search_by_product(base, queries, Dim)); }, count}};
+  const auto flann = make_flann_trees(Dim, 4);
+  std::size_t checks = 0;
+  if (flann) {
+    flann->add(base.data(), base.size() / Dim);
+    const auto search = [&](std::size_t budget) { return flann->search(queries, static_cast<int>(budget)); };
+    checks = budget_for(search, exact, mark, of_matches, 8192);
+    if (checks > 0)
+      contenders.push_back({"FLANN 4 trees", [&, search] { do_not_optimise(search(checks)); }, count});
+  }
+  const auto timings = interleave(contenders, {.rounds = 7, .seconds_per_round = 0.02});
+  const Timing* best = &timings[1];
+  for (std::size_t i = 2; i < timings.size(); ++i)
+    best = timings[i].median < best->median ? &timings[i] : best;
+  Row row = against_rival(name, timings[0].median * 1e6, ratio(*best, timings[0]) * timings[0].median * 1e6,
+                          best->name, must, aim, "us");
+  row.note += "; " + std::to_string(leaves) + " leaves, FLANN " + std::to_string(checks) + " checks";
+  board.add(row);
+}
+
+/// The first 64 of each 128 numbers: half of the patch.
+std::vector<float> first_half(const std::vector<float>& rows) {
+  std::vector<float> halves;
+  for (std::size_t i = 0; i < rows.size(); i += 128)
+    halves.insert(halves.end(), rows.begin() + static_cast<std::ptrdiff_t>(i),
+                  rows.begin() + static_cast<std::ptrdiff_t>(i + 64));
+  return halves;
+}
+
+void score_threads(Scoreboard& board, const std::vector<float>& base, const std::vector<float>& queries) {
+  const Ours<64> ours(base);
+  const auto timings = interleave({{"1", [&] { do_not_optimise(ours.search(queries, 32, 1)); }, 1},
+                                   {"2", [&] { do_not_optimise(ours.search(queries, 32, 2)); }, 1}},
+                                  {.rounds = 15, .seconds_per_round = 0.05});
+  board.add({.name = "batch of queries, two threads against one",
+             .measured = ratio(timings[0], timings[1]),
+             .unit = "x",
+             .must = 1.8,
+             .aim = std::nullopt,
+             .better = larger,
+             .note = "needs two idle cores"});
+}
+
+}  // namespace
+
+void score_descriptors(Scoreboard& board) {
+  const auto base = clustered_descriptors(100000, 1);
+  const auto queries = noisy_copies(base, 1000, 2);
+  score_threads(board, base, queries);
+  const auto data = sift();
+  if (!data) {
+    board.add({.name = "128-d SIFT", .note = "no data"});
+    return;
+  }
+  const std::vector<float> small(data->base.begin(), data->base.begin() + 128 * 10000);
+  score_mark<64>(board, "64 of SIFT's numbers, n = 99000: 99 % of matches", first_half(data->base),
+                 first_half(data->queries), 0.99, true, 3, 6);
+  score_mark<128>(board, "SIFT, n = 1e4: 99 % of matches", small, data->queries, 0.99, true, 2, 4);
+  score_mark<128>(board, "SIFT, n = 99000: 99 % of matches", data->base, data->queries, 0.99, true, 3, 6);
+  score_mark<128>(board, "SIFT, n = 99000: recall 0.95", data->base, data->queries, 0.95, false, 1.2, 2);
+}
+
+}  // namespace cairn_bench

@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// Other libraries behind one face. Each maker returns null where the library was not found at configure
+/// time.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "data.hpp"
+
+namespace cairn_bench {
+
+/// Exact search over 3-D points. Distances returned are true ones.
+struct StaticRival {
+  std::string name;
+  std::function<void()> build;
+  std::function<float(const Point3&, std::size_t k)> kth_distance;
+  std::function<std::size_t(const Point3&, float radius)> count_within;
+};
+std::unique_ptr<StaticRival> make_nanoflann(const std::vector<Point3>& points);
+std::unique_ptr<StaticRival> make_flann_single(const std::vector<Point3>& points);
+std::unique_ptr<StaticRival> make_cgal(const std::vector<Point3>& points);
+
+/// A growing index of 3-D points: nearest one.
+struct GrowingRival {
+  std::string name;
+  std::function<void(std::size_t begin, std::size_t end)> insert;  ///< points [begin, end) of the set
+  std::function<float(const Point3&)> nearest;
+};
+std::unique_ptr<GrowingRival> make_nanoflann_dynamic(const std::vector<Point3>& points);
+
+/// Two nearest descriptors with a budget of checks. Ids count from the first descriptor added.
+struct TwoNearest {
+  std::size_t id;
+  float first;
+  float second;
+};
+struct DescriptorRival {
+  std::string name;
+  std::function<void(const float* rows, std::size_t count)> add;
+  std::function<std::vector<TwoNearest>(const std::vector<float>& queries, int checks)> search;
+};
+std::unique_ptr<DescriptorRival> make_flann_trees(std::size_t dim, int trees);
+
+}  // namespace cairn_bench

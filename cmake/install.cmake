@@ -1,0 +1,27 @@
+# cmake --install, the CMake package and the pkg-config file. A project that includes cairn as a subfolder gets no
+# install rules from it.
+option(CAIRN_INSTALL "Make install rules" ${PROJECT_IS_TOP_LEVEL})
+if(NOT CAIRN_INSTALL)
+  return()
+endif()
+include(GNUInstallDirs)
+include(CMakePackageConfigHelpers)
+
+# Headers alone: nothing depends on the architecture, so everything else goes to share.
+set(config_folder "${CMAKE_INSTALL_DATADIR}/cmake/cairn")
+install(TARGETS cairn EXPORT cairn_targets
+  FILE_SET HEADERS DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}"
+  INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+install(EXPORT cairn_targets NAMESPACE cairn:: DESTINATION "${config_folder}" FILE cairn-targets.cmake)
+
+configure_package_config_file(cmake/cairn-config.cmake.in "${PROJECT_BINARY_DIR}/cairn-config.cmake"
+  INSTALL_DESTINATION "${config_folder}")
+# Before 1.0 a minor version may change the interface: 0.1 does not stand in for 0.2.
+write_basic_package_version_file("${PROJECT_BINARY_DIR}/cairn-config-version.cmake"
+  COMPATIBILITY SameMinorVersion ARCH_INDEPENDENT)
+install(FILES "${PROJECT_BINARY_DIR}/cairn-config.cmake" "${PROJECT_BINARY_DIR}/cairn-config-version.cmake"
+  DESTINATION "${config_folder}")
+
+configure_file(cmake/cairn.pc.in "${PROJECT_BINARY_DIR}/cairn.pc" @ONLY)
+install(FILES "${PROJECT_BINARY_DIR}/cairn.pc" DESTINATION "${CMAKE_INSTALL_DATADIR}/pkgconfig")
+install(FILES LICENSE DESTINATION "${CMAKE_INSTALL_DATADIR}/licenses/cairn")

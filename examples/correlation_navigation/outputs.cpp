@@ -1,0 +1,296 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "outputs.hpp"
+
+#include <array>
+#include <cmath>
+#include <iostream>
+#include <numbers>
+#include <system_error>
+
+#include <nlohmann/json.hpp>
+
+#include <cairn/core/check.hpp>
+#include <cairn/io/file.hpp>
+#include <cairn/io/text.hpp>
+
+#include "support/report.hpp"
+
+namespace correlation_navigation {
+
+namespace {
+
+using example::Ink;
+using example::readable;
+
+struct StateName {
+  const char* symbol;
+  const char* title;
+  const char* unit;
+  double factor;  // from SI to the unit shown
+};
+constexpr std::array<StateName, 5> state_names{{{"x", "Position along track", "m", 1},
+                                                {"V", "Velocity", "m/s", 1},
+                                                {"L_x", "Scale along track", "m", 1},
+                                                {"L_y", "Scale across track", "m", 1},
+                                                {"psi", "Heading error", "deg", 180 / std::numbers::pi}}};
+
+std::vector<double> scaled(std::vector<double> values, double factor) {
+  for (double& value : values) value *= factor;
+  return values;
+}
+
+std::vector<double> sizes(std::vector<double> values) {
+  for (double& value : values) value = std::abs(value);
+  return values;
+}
+
+void add_straight(example::Report& page, const Results& r) {
+  for (std::size_t i = 0; i < state_names.size(); ++i) {
+    const StateName& name = state_names[i];
+    page.add(example::LinePlot{
+        .title = name.title,
+        .caption = i == 0 ? "Straight flight over a Gaussian random field, the document's figure 2: "
+                            "the errors made, those the filter predicts, and the Cramer-Rao bound."
+                          : "",
+        .x = {"time", "s"},
+        .y = {std::string("error of ") + name.symbol, name.unit},
+        .x_values = r.straight.time,
+        .curves = {{"made, rms of all runs", Ink::wrong, scaled(r.straight.rms_error[i], name.factor)},
+                   {"made in the first run", Ink::grey, scaled(sizes(r.straight.one_run[i]), name.factor)},
+                   {"predicted", Ink::belief, scaled(r.straight.sigma[i], name.factor)},
+                   {"bound", Ink::truth, scaled(r.straight.bound[i], name.factor), true}},
+        .logarithmic = true});
+  }
+  const std::vector<double> low(r.straight.time.size(), r.straight.nees_band.low);
+  const std::vector<double> high(r.straight.time.size(), r.straight.nees_band.high);
+  page.add(example::LinePlot{
+      .title = "Does the filter know its errors?",
+      .caption = "Mean NEES of five states with its 95 % band; the map's correlated error is in the "
+                 "filter's weights.",
+      .x = {"time", "s"},
+      .y = {"NEES", ""},
+      .x_values = r.straight.time,
+      .curves = {{"mean over the runs", Ink::belief, r.straight.nees},
+                 {"band", Ink::grey, low, true},
+                 {"band", Ink::grey, high, true}}});
+  example::Table budget{
+      .title = "What limits the position",
+      .caption =
+          "Position sigma at the end of the flight for errors of sensor and map (in units of the "
+          "field). The map's error dominates as soon as it is half the sensor's: its samples err "
+          "together and do not average out. Hence the loop below.",
+      .columns = {"sensor", "map", "position sigma [m]"}};
+  for (const BudgetRow& row : r.budget)
+    budget.rows.push_back({readable(row.sensor_noise), readable(row.map_error), readable(row.final_sigma)});
+  page.add(budget);
+  example::Table lost{
+      .title = "How far off may the start be?",
+      .caption = "Share of runs lost after five frames, by the initial error in correlation lengths.",
+      .columns = {"initial error", "extended filter", "iterated filter", "search first"}};
+  for (const DivergenceRow& row : r.divergence)
+    lost.rows.push_back(
+        {readable(row.start), readable(row.extended), readable(row.iterated), readable(row.searched)});
+  page.add(lost);
+}
+
+void add_acquisition(example::Report& page, const Results& r) {
+  example::PlaneCurve right{"right", Ink::belief, {}, {}, true}, refused{"refused", Ink::grey, {}, {}, true},
+      wrong{"accepted, wrong", Ink::wrong, {}, {}, true};
+  for (const AcquisitionTrial& t : r.acquisition.trials) {
+    example::PlaneCurve& curve = !t.fix.accepted()                       ? refused
+                                 : t.error <= r.acquisition.right_within ? right
+                                                                         : wrong;
+    curve.x.push_back(t.truth_x);
+    curve.y.push_back(t.truth_y);
+  }
+  page.add(example::PlanePlot{
+      .title = "Acquisition within 2 km",
+      .caption = "Where each start was, and whether the correlation search found it. Field: " + r.field,
+      .x = {"east", "m"},
+      .y = {"north", "m"},
+      .curves = {right, refused, wrong}});
+}
+
+void add_planar(example::Report& page, const Results& r) {
+  example::PlaneCurve truth{"truth", Ink::truth, {}, {}, false}, belief{"belief", Ink::belief, {}, {}, true},
+      searched{"correlation search", Ink::measurement, {}, {}, true};
+  std::vector<double> time, error, three_sigma, blind;
+  for (const PlanarPoint& p : r.planar.points) {
+    truth.x.push_back(p.truth_x);
+    truth.y.push_back(p.truth_y);
+    belief.x.push_back(p.x);
+    belief.y.push_back(p.y);
+    if (p.searched) {
+      searched.x.push_back(p.x);
+      searched.y.push_back(p.y);
+    }
+    time.push_back(p.time);
+    error.push_back(p.error);
+    three_sigma.push_back(3.0 * p.sigma);
+  }
+  page.add(example::PlanePlot{
+      .title = "A flight with turns",
+      .caption = "Search at the start, tracking, a blind stretch with a gust, search again.",
+      .x = {"east", "m"},
+      .y = {"north", "m"},
+      .curves = {truth, belief, searched}});
+  page.add(example::LinePlot{
+      .title = "Error of that flight",
+      .caption = "The prediction grows while the sensor is blind and falls with the new fix.",
+      .x = {"time", "s"},
+      .y = {"position error", "m"},
+      .x_values = time,
+      .curves = {{"error", Ink::wrong, error}, {"3 sigma", Ink::belief, three_sigma, true}},
+      .logarithmic = true});
+}
+
+void add_loop(example::Report& page, const Results& r) {
+  example::PlaneCurve truth{"truth", Ink::truth, {}, {}, false},
+      before{"dead reckoning", Ink::wrong, {}, {}, false}, after{"corrected", Ink::belief, {}, {}, false};
+  std::vector<double> time, error_before, error_after, sigma_after;
+  for (const LoopFrame& f : r.loop.frames) {
+    truth.x.push_back(f.truth_x);
+    truth.y.push_back(f.truth_y);
+    before.x.push_back(f.before_x);
+    before.y.push_back(f.before_y);
+    after.x.push_back(f.after_x);
+    after.y.push_back(f.after_y);
+    time.push_back(f.time);
+    error_before.push_back(std::hypot(f.before_x - f.truth_x, f.before_y - f.truth_y));
+    error_after.push_back(std::hypot(f.after_x - f.truth_x, f.after_y - f.truth_y));
+    sigma_after.push_back(f.sigma_after);
+  }
+  page.add(example::PlanePlot{
+      .title = "Mapping along a loop",
+      .caption = "The field is mapped while dead reckoning drifts; the return to the start is "
+                 "recognised and all frames are corrected.",
+      .x = {"east", "m"},
+      .y = {"north", "m"},
+      .curves = {truth, before, after}});
+  page.add(example::LinePlot{.title = "Where the map's frames lie",
+                             .caption = "Map against field, rms: " + readable(r.loop.map_rms_before) +
+                                        " before, " + readable(r.loop.map_rms_after) +
+                                        " after; the field itself varies by " +
+                                        readable(r.loop.field_deviation) + ".",
+                             .x = {"time", "s"},
+                             .y = {"distance from the truth", "m"},
+                             .x_values = time,
+                             .curves = {{"dead reckoning", Ink::wrong, error_before},
+                                        {"corrected", Ink::belief, error_after},
+                                        {"predicted sigma after", Ink::grey, sigma_after, true}}});
+}
+
+std::string errors_csv(const StraightResult& result) {
+  std::string text = "time";
+  for (const StateName& name : state_names)
+    for (const char* kind : {"_rms", "_sigma", "_bound"}) text += std::string(",") + name.symbol + kind;
+  text += ",nees\n";
+  for (std::size_t k = 0; k < result.time.size(); ++k) {
+    cairn::append_number(text, result.time[k]);
+    for (std::size_t i = 0; i < state_names.size(); ++i)
+      for (const auto* series : {&result.rms_error[i], &result.sigma[i], &result.bound[i]}) {
+        text += ',';
+        cairn::append_number(text, (*series)[k]);
+      }
+    text += ',';
+    cairn::append_number(text, result.nees[k]);
+    text += '\n';
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string summary(const Results& r) {
+  nlohmann::ordered_json json;
+  json["field"] = r.field;
+  json["notes"] = r.notes;
+  json["seed"] = r.seed;
+  json["runs"] = r.runs;
+  json["seconds"] = r.seconds;
+  json["acquisition_rate"] = r.acquisition.rate;
+  json["acquisition_wrong_rate"] = r.acquisition.wrong_rate;
+  json["acquisition_rms_error_m"] = r.acquisition.rms_error;
+  json["rms_position_error_m"] = r.straight.rms_position_error;
+  json["max_position_error_m"] = r.straight.max_position_error;
+  json["rmse_over_crb"] = r.straight.rmse_over_bound;
+  json["nees_mean"] = r.straight.nees_mean;
+  json["nees_band"] = {r.straight.nees_band.low, r.straight.nees_band.high};
+  json["divergence_rate"] = nlohmann::ordered_json::array();
+  for (const DivergenceRow& row : r.divergence)
+    json["divergence_rate"].push_back({{"initial_error_over_correlation_length", row.start},
+                                       {"extended", row.extended},
+                                       {"iterated", row.iterated},
+                                       {"search_first", row.searched}});
+  json["error_budget"] = nlohmann::ordered_json::array();
+  for (const BudgetRow& row : r.budget)
+    json["error_budget"].push_back({{"sensor_noise", row.sensor_noise},
+                                    {"map_error", row.map_error},
+                                    {"final_position_sigma_m", row.final_sigma}});
+  json["planar"] = {{"rms_position_error_m", r.planar.rms_error},
+                    {"max_position_error_m", r.planar.max_error},
+                    {"frames", r.planar.points.size()},
+                    {"frames_tracked", r.planar.frames_tracked},
+                    {"searches", r.planar.searches},
+                    {"reacquired", r.planar.reacquired}};
+  json["loop"] = {{"closed", r.loop.closed},
+                  {"closing_error_m", r.loop.closing_error},
+                  {"placement_rms_before_m", r.loop.placement_rms_before},
+                  {"placement_rms_after_m", r.loop.placement_rms_after},
+                  {"map_rms_before", r.loop.map_rms_before},
+                  {"map_rms_after", r.loop.map_rms_after},
+                  {"field_deviation", r.loop.field_deviation}};
+  return json.dump(2) + "\n";
+}
+
+std::optional<std::string> report(const Results& r) {
+  example::Report page("Correlation navigation", "position from a mapped field, " + std::to_string(r.runs) +
+                                                     " runs; field of "
+                                                     "the flights: " +
+                                                     r.field);
+  using Verdict = example::KeyFigure::Verdict;
+  const auto judged = [](bool good) { return good ? Verdict::good : Verdict::bad; };
+  page.figure({"Position RMSE / Cramer-Rao bound", readable(r.straight.rmse_over_bound, 4), "",
+               "straight flight, second half", judged(r.straight.rmse_over_bound <= 1.2)});
+  page.figure({"NEES, 5 states", readable(r.straight.nees_mean), "",
+               "band " + readable(r.straight.nees_band.low) + " to " + readable(r.straight.nees_band.high),
+               judged(r.straight.nees_band.contains(r.straight.nees_mean))});
+  page.figure({"Acquired within 2 km", readable(100 * r.acquisition.rate), "%",
+               "wrong fixes accepted: " + readable(100 * r.acquisition.wrong_rate) + " %",
+               judged(r.acquisition.rate >= 0.95 && r.acquisition.wrong_rate == 0)});
+  page.figure({"Flight with turns, rms error", readable(r.planar.rms_error), "m",
+               "frames tracked: " + std::to_string(r.planar.frames_tracked), judged(r.planar.reacquired)});
+  page.figure({"Map error before", readable(r.loop.map_rms_before), "", "rms against the field"});
+  page.figure({"Map error after the loop", readable(r.loop.map_rms_after), "", "rms against the field",
+               judged(r.loop.map_rms_after < r.loop.map_rms_before)});
+  for (const std::string& note : r.notes) page.note(note);
+  add_straight(page, r);
+  if (!r.acquisition.trials.empty()) add_acquisition(page, r);
+  if (!r.planar.points.empty()) add_planar(page, r);
+  if (!r.loop.frames.empty()) add_loop(page, r);
+  return page.html();
+}
+
+void prepare_folder(const std::filesystem::path& folder) {
+  std::error_code failure;
+  std::filesystem::create_directories(folder, failure);
+  if (failure)
+    cairn::raise(folder.string() + ": cannot make this folder (" + failure.message() +
+                 "); expected a writable place");
+  const std::filesystem::path probe = folder / "write_probe";
+  cairn::write_file_atomically(probe, "");
+  std::filesystem::remove(probe, failure);
+}
+
+void write_outputs(const Results& results, const std::filesystem::path& folder) {
+  prepare_folder(folder);
+  cairn::write_file_atomically(folder / "summary.json", summary(results));
+  cairn::write_file_atomically(folder / "errors.csv", errors_csv(results.straight));
+  if (const std::optional<std::string> page = report(results))
+    cairn::write_file_atomically(folder / "report.html", *page);
+  else
+    std::clog << example::why_no_report() << '\n';
+}
+
+}  // namespace correlation_navigation

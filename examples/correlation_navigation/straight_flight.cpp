@@ -1,0 +1,221 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "straight_flight.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/core/parallel.hpp>
+#include <cairn/core/random.hpp>
+#include <cairn/field/correlation.hpp>
+#include <cairn/field/field_map.hpp>
+#include <cairn/field/patch_filter.hpp>
+#include <cairn/field/patch_model.hpp>
+#include <cairn/field/patch_noise.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/kalman.hpp>
+
+namespace correlation_navigation {
+
+namespace {
+
+using Belief = cairn::Gaussian<cairn::Vector<5>>;
+using cairn::Vector;
+
+/// The ground as it is, and as the first mapping recorded it.
+struct Ground {
+  cairn::BsplineMap truth, map;
+};
+
+Ground draw_ground(const StraightFlight& flight, cairn::Random& random) {
+  const double step = flight.scale;
+  const double behind = (flight.shape.behind + 2) * step + 6.0 * flight.sigma[0];
+  const double ahead = flight.velocity * flight.interval * flight.frames + behind +
+                       6.0 * flight.sigma[1] * flight.interval * flight.frames;
+  const int columns = static_cast<int>((behind + ahead) / step) + 2 * flight.shape.ahead;
+  const int half_rows = flight.shape.half_width + 6;
+  const cairn::GridFrame frame{-behind - flight.shape.ahead * step, -half_rows * step, step, step};
+  cairn::FieldGrid truth = flight.field.draw(columns, 2 * half_rows + 1, frame, random);
+  cairn::FieldGrid map = truth;
+  if (flight.map_error > 0.0) {
+    const cairn::FieldGrid error = cairn::RandomField{flight.map_error, flight.map_alpha}.draw(
+        columns, 2 * half_rows + 1, frame, random);
+    for (std::size_t i = 0; i < map.values().size(); ++i) map.values()[i] += error.values()[i];
+  }
+  return {cairn::BsplineMap(std::move(truth)), cairn::BsplineMap(std::move(map))};
+}
+
+cairn::PatchNoise noise_of(const StraightFlight& flight) {
+  return cairn::PatchNoise(flight.sensor_noise * flight.sensor_noise, flight.shape,
+                           flight.map_error * flight.map_error, flight.map_alpha, flight.scale, flight.scale);
+}
+
+Belief start_of(const StraightFlight& flight) {
+  const Vector<5> sigma = Eigen::Map<const Vector<5>>(flight.sigma.data());
+  return {Vector<5>(0.0, flight.velocity, flight.scale, flight.scale, 0.0), sigma.cwiseAbs2().asDiagonal()};
+}
+
+std::vector<double> see(const StraightFlight& flight, const Ground& ground, const Vector<5>& truth,
+                        cairn::Random& random) {
+  cairn::PatchSamples samples;
+  cairn::sample_patch(ground.truth, flight.shape, cairn::AlongTrackPlacement{}.placement(truth), samples);
+  for (double& value : samples.value) value += flight.sensor_noise * random.normal();
+  return std::move(samples.value);
+}
+
+/// One run: errors, predicted variances, bound and NEES at each frame.
+struct Run {
+  std::vector<Vector<5>> error, variance, bound;
+  std::vector<double> nees;
+  std::size_t refused = 0;
+};
+
+Run fly_once(const StraightFlight& flight, const cairn::PatchNoise& noise, cairn::Random random) {
+  const Ground ground = draw_ground(flight, random);
+  const cairn::AlongTrackMotion motion{};
+  const cairn::AlongTrackPlacement where{};
+  const cairn::PatchFilter filter{};
+  cairn::PatchScratch scratch;
+  Belief belief = start_of(flight), bound = belief;
+  Vector<5> truth = cairn::sample(belief, random);
+  Run run;
+  for (int k = 0; k < flight.frames; ++k) {
+    if (k > 0) {
+      truth = motion.propagate(truth, {}, flight.interval);
+      static_cast<void>(cairn::Kalman{}.predict(belief, motion, flight.interval));
+      static_cast<void>(cairn::Kalman{}.predict(bound, motion, flight.interval));
+    }
+    const std::vector<double> z = see(flight, ground, truth, random);
+    if (!filter.update(belief, where, ground.map, flight.shape, z, noise, scratch).accepted()) ++run.refused;
+    if (const auto information =
+            filter.information(truth, where, ground.truth, flight.shape, noise, scratch)) {
+      const cairn::Matrix<5> prior = bound.covariance.llt().solve(cairn::Matrix<5>::Identity());
+      bound.covariance = (prior + *information).llt().solve(cairn::Matrix<5>::Identity());
+    }
+    run.error.push_back(belief.mean - truth);
+    run.variance.push_back(belief.covariance.diagonal());
+    run.bound.push_back(bound.covariance.diagonal());
+    run.nees.push_back(cairn::nees(belief, truth));
+  }
+  return run;
+}
+
+}  // namespace
+
+StraightResult fly_straight(const StraightFlight& flight, std::size_t runs) {
+  const cairn::PatchNoise noise = noise_of(flight);
+  std::vector<Run> all(runs);
+  cairn::parallel_for(runs, flight.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t run = begin; run < end; ++run)
+      all[run] = fly_once(flight, noise, cairn::Random(flight.seed, run));
+  });
+  StraightResult result;
+  const auto count = static_cast<double>(runs);
+  const auto frames = static_cast<std::size_t>(flight.frames);
+  double squares = 0, bounds = 0, nees = 0;
+  for (std::size_t k = 0; k < frames; ++k) {
+    Vector<5> error = Vector<5>::Zero(), variance = error, bound = error;
+    double mean_nees = 0;
+    for (const Run& run : all) {
+      error += run.error[k].cwiseAbs2() / count;
+      variance += run.variance[k] / count;
+      bound += run.bound[k] / count;
+      mean_nees += run.nees[k] / count;
+      if (k >= frames / 2)
+        result.max_position_error = std::max(result.max_position_error, std::abs(run.error[k](0)));
+    }
+    result.time.push_back(static_cast<double>(k) * flight.interval);
+    result.nees.push_back(mean_nees);
+    for (int i = 0; i < 5; ++i) {
+      const auto state = static_cast<std::size_t>(i);
+      result.rms_error[state].push_back(std::sqrt(error(i)));
+      result.sigma[state].push_back(std::sqrt(variance(i)));
+      result.bound[state].push_back(std::sqrt(bound(i)));
+      result.one_run[state].push_back(all.front().error[k](i));
+    }
+    if (k < frames / 2) continue;
+    squares += error(0);
+    bounds += bound(0);
+    nees += mean_nees;
+  }
+  const auto half = static_cast<double>(frames - frames / 2);
+  result.rmse_over_bound = std::sqrt(squares / bounds);
+  result.rms_position_error = std::sqrt(squares / half);
+  result.nees_mean = nees / half;
+  result.nees_band = cairn::chi_square_mean_band(5, count);
+  for (const Run& run : all) result.refused += run.refused;
+  return result;
+}
+
+std::vector<BudgetRow> error_budget(const StraightFlight& flight) {
+  std::vector<BudgetRow> rows;
+  for (const double sensor : {0.05, 0.1, 0.2})
+    for (const double map : {0.0, 0.05, 0.1, 0.2}) {
+      StraightFlight variant = flight;
+      variant.sensor_noise = sensor;
+      variant.map_error = map;
+      const StraightResult result = fly_straight(variant, 6);
+      rows.push_back({sensor, map, result.bound[0].back()});
+    }
+  return rows;
+}
+
+std::vector<DivergenceRow> divergence(const StraightFlight& flight, std::size_t runs) {
+  std::vector<DivergenceRow> rows;
+  const double length = 1.0 / flight.field.alpha;
+  for (const double start : {0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0}) {
+    StraightFlight variant = flight;
+    variant.frames = 5;
+    variant.sigma[0] = start * length;
+    const cairn::PatchNoise noise = noise_of(variant);
+    std::vector<std::array<bool, 3>> lost(runs);
+    cairn::parallel_for(runs, flight.threads, [&](std::size_t begin, std::size_t end) {
+      cairn::PatchScratch scratch;
+      const cairn::AlongTrackMotion motion{};
+      const cairn::AlongTrackPlacement where{};
+      for (std::size_t run = begin; run < end; ++run) {
+        cairn::Random random(flight.seed + 7, run);
+        const Ground ground = draw_ground(variant, random);
+        std::array<Belief, 3> beliefs{start_of(variant), start_of(variant), start_of(variant)};
+        Vector<5> truth = beliefs[0].mean;
+        truth(0) += (random.uniform() < 0.5 ? -1.0 : 1.0) * start * length;
+        for (int k = 0; k < variant.frames; ++k) {
+          if (k > 0) {
+            truth = motion.propagate(truth, {}, variant.interval);
+            for (Belief& belief : beliefs)
+              static_cast<void>(cairn::Kalman{}.predict(belief, motion, variant.interval));
+          }
+          const std::vector<double> z = see(variant, ground, truth, random);
+          if (k == 0) {
+            const cairn::Fix fix =
+                cairn::correlation_search(ground.map, variant.shape, z, where.placement(beliefs[2].mean),
+                                          {.radius = 3.0 * variant.sigma[0] + variant.scale});
+            if (fix.accepted()) {
+              beliefs[2].mean(0) = fix.placement.x;
+              beliefs[2].covariance(0, 0) = fix.covariance(0, 0) + 0.1 * variant.scale * variant.scale;
+            }
+          }
+          for (std::size_t f = 0; f < 3; ++f)
+            static_cast<void>(cairn::PatchFilter{.iterations = f == 0 ? 1 : 8}.update(
+                beliefs[f], where, ground.map, variant.shape, z, noise, scratch));
+        }
+        for (std::size_t f = 0; f < 3; ++f) {
+          const double error = std::abs(beliefs[f].mean(0) - truth(0));
+          lost[run][f] = error > 5.0 * std::sqrt(beliefs[f].covariance(0, 0)) && error > 0.1 * length;
+        }
+      }
+    });
+    DivergenceRow row{start};
+    for (const std::array<bool, 3>& run : lost) {
+      row.extended += run[0] ? 1.0 / static_cast<double>(runs) : 0.0;
+      row.iterated += run[1] ? 1.0 / static_cast<double>(runs) : 0.0;
+      row.searched += run[2] ? 1.0 / static_cast<double>(runs) : 0.0;
+    }
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+}  // namespace correlation_navigation

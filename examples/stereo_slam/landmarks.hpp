@@ -1,0 +1,65 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The landmarks of the map: where each is, how sure that is, how often it was seen.
+///
+/// Their looks live in a landmark store (cairn/index/landmark_map.hpp); both go by the same id.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <unordered_map>
+#include <vector>
+
+#include <cairn/core/check.hpp>
+#include <cairn/core/linalg.hpp>
+#include <cairn/filter/gaussian.hpp>
+
+namespace stereo_slam {
+
+using LandmarkId = std::uint32_t;
+inline constexpr int descriptor_size = 64;
+
+struct Landmark {
+  LandmarkId id = 0;
+  cairn::Gaussian<cairn::Vector<3>> position;  ///< world frame [m]
+  std::array<float, descriptor_size> descriptor{};
+  std::int8_t sign = 0;  ///< of the Laplacian: -1 bright, +1 dark
+  std::uint8_t grey = 0;
+  int first_seen = 0;  ///< step
+  int sightings = 1;
+};
+
+/// Landmarks in no particular but deterministic order, found by id in O(1).
+class Landmarks {
+public:
+  void add(const Landmark& landmark) {
+    place_[landmark.id] = landmarks_.size();
+    landmarks_.push_back(landmark);
+  }
+
+  void remove(LandmarkId id) {
+    const auto found = place_.find(id);
+    CAIRN_EXPECTS(found != place_.end(), "landmarks: no landmark has this id");
+    const std::size_t place = found->second;
+    place_.erase(found);
+    if (place + 1 != landmarks_.size()) {
+      landmarks_[place] = landmarks_.back();
+      place_[landmarks_[place].id] = place;
+    }
+    landmarks_.pop_back();
+  }
+
+  [[nodiscard]] Landmark& operator[](LandmarkId id) { return landmarks_[place_.at(id)]; }
+  [[nodiscard]] const Landmark& operator[](LandmarkId id) const { return landmarks_[place_.at(id)]; }
+  [[nodiscard]] const std::vector<Landmark>& all() const noexcept { return landmarks_; }
+  [[nodiscard]] std::size_t size() const noexcept { return landmarks_.size(); }
+
+private:
+  std::vector<Landmark> landmarks_;
+  std::unordered_map<LandmarkId, std::size_t> place_;
+};
+
+}  // namespace stereo_slam

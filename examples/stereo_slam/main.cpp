@@ -1,0 +1,162 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// stereo_slam: runs the stereo landmark SLAM system on a rendered arena or a recorded drive.
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <future>
+#include <iostream>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+
+#include <cairn/core/check.hpp>
+
+#include "dataset.hpp"
+#include "outputs.hpp"
+#include "pipeline.hpp"
+#include "summary.hpp"
+#include "support/progress.hpp"
+
+namespace {
+
+struct Arguments {
+  stereo_slam::DatasetOptions dataset;
+  stereo_slam::PipelineOptions pipeline;
+  std::filesystem::path out = "stereo_slam_out";
+  std::filesystem::path dump;
+  std::string store = "multi";
+};
+
+/// Everything the command line can say; CLI11 ends the program by an exception on --help and on mistakes.
+void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& dataset) {
+  app.add_option("--dataset", dataset,
+                 "arena (rendered, needs nothing), or a recorded drive and its folder:\n"
+                 "kitti_odometry DIR, kitti_raw DIR (unrectified), euroc DIR")
+      ->expected(1, 2)
+      ->type_name("KIND [DIR]")
+      ->default_str("arena");
+  app.add_option("--out", arguments.out, "folder for the results")->type_name("DIR")->capture_default_str();
+  app.add_option("--frames", arguments.dataset.frames, "stop after so many frames; 0 = all")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_option("--seed", arguments.pipeline.seed,
+                 "of the arena and of all random draws; same seed, same bytes")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
+  app.add_option("--threads", arguments.pipeline.threads, "threads; the results do not depend on it")
+      ->check(CLI::Range(1U, 1024U))
+      ->capture_default_str();
+  app.add_option("--store", arguments.store,
+                 "landmark store: multi (a forest of kd-trees) or single (one, rebuilt)")
+      ->check(CLI::IsMember({"multi", "single"}))
+      ->capture_default_str();
+  app.add_option("--points", arguments.pipeline.points, "interest points to keep in an image")
+      ->check(CLI::Range(50, 20000))
+      ->capture_default_str();
+  app.add_flag("--oriented", arguments.pipeline.oriented,
+               "oriented SURF, for cameras that roll (default: upright)");
+  app.add_option("--script", arguments.dataset.arena.script,
+                 "arena: turn (on the spot), loop (two laps) or spiral")
+      ->check(CLI::IsMember({"turn", "loop", "spiral"}))
+      ->capture_default_str();
+  app.add_option("--drift", arguments.dataset.arena.drift,
+                 "arena: the right camera turns by so many degrees in 100 frames, unknown to the system")
+      ->capture_default_str();
+  app.add_flag("!--no-cache", arguments.dataset.arena.cache, "arena: do not keep rendered images on disk");
+  app.add_option("--dump", arguments.dump, "write the frames as a KITTI odometry sequence into DIR and stop")
+      ->type_name("DIR");
+}
+
+/// Runs the system over the data set; the next frame is loaded while this one is worked on.
+stereo_slam::RunRecord run(const stereo_slam::Dataset& dataset, const Arguments& arguments) {
+  using Clock = std::chrono::steady_clock;
+  stereo_slam::Pipeline pipeline(dataset.rig(), arguments.pipeline);
+  example::Progress progress(std::cerr, "frames", dataset.size());
+  const Clock::time_point start = Clock::now();
+  const auto load = [&](std::size_t i) {
+    const Clock::time_point begin = Clock::now();
+    stereo_slam::StereoFrame frame = dataset.frame(i);
+    return std::pair{std::move(frame),
+                     std::chrono::duration<double, std::milli>(Clock::now() - begin).count()};
+  };
+  auto next = std::async(std::launch::deferred, load, std::size_t{0});
+  for (std::size_t i = 0; i < dataset.size(); ++i) {
+    auto [frame, load_milliseconds] = next.get();
+    const auto policy = arguments.pipeline.threads > 1 ? std::launch::async : std::launch::deferred;
+    if (i + 1 < dataset.size()) next = std::async(policy, load, i + 1);
+    const stereo_slam::FrameRecord& result = pipeline.step(frame, load_milliseconds);
+    progress.step(result.tracked
+                      ? std::to_string(result.inliers) + " of " + std::to_string(result.stereo_matches) +
+                            " points agree, " + std::to_string(result.landmarks) + " landmarks"
+                      : "lost");
+  }
+  stereo_slam::RunRecord record = pipeline.record();
+  record.seconds = std::chrono::duration<double>(Clock::now() - start).count();
+  record.dataset = dataset.name();
+  const std::vector<std::string> notes = dataset.notes();
+  record.notes.insert(record.notes.begin(), notes.begin(), notes.end());
+  return record;
+}
+
+/// The run in a few lines; summary.json has everything.
+void print_summary(const stereo_slam::RunRecord& record) {
+  const stereo_slam::Summary summary = stereo_slam::summarise(record);
+  for (const std::string& note : record.notes) std::cout << "note: " << note << '\n';
+  std::printf("%s: %zu frames, %zu lost, %.1f s, %.1f frames a second, %zu landmarks\n",
+              record.dataset.c_str(), summary.frames, summary.frames_lost, summary.seconds, summary.hz,
+              summary.landmarks);
+  if (!summary.errors) return;
+  constexpr double degrees = 57.29577951308232;
+  std::printf("path %.2f m, error at the end %.3f m, largest %.3f m and %.2f degrees\n", summary.path,
+              summary.errors->end, summary.errors->largest.position,
+              summary.errors->largest.heading * degrees);
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Stereo landmark SLAM: SURF points, a growing forest of kd-trees, robust pose in pixels, Kalman "
+      "filters.");
+  Arguments arguments;
+  arguments.pipeline.threads = std::max(1U, std::thread::hardware_concurrency());
+  std::vector<std::string> dataset{"arena"};
+  define(app, arguments, dataset);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  try {
+    arguments.dataset.kind = dataset.front();
+    if (dataset.size() > 1) arguments.dataset.folder = dataset[1];
+    arguments.dataset.threads = arguments.pipeline.threads;
+    arguments.dataset.arena.seed = arguments.pipeline.seed;
+    arguments.pipeline.store.kind =
+        arguments.store == "multi" ? stereo_slam::StoreKind::multi : stereo_slam::StoreKind::single;
+    const auto frames = stereo_slam::open_dataset(arguments.dataset);
+    if (!arguments.dump.empty()) {
+      stereo_slam::write_kitti_sequence(*frames, arguments.dump);
+      return 0;
+    }
+    stereo_slam::prepare_output_folder(arguments.out);
+    arguments.pipeline.sample_frame = frames->size() / 2;
+    const stereo_slam::RunRecord record = run(*frames, arguments);
+    const std::optional<std::string> no_report = stereo_slam::write_outputs(record, arguments.out);
+    print_summary(record);
+    if (no_report) std::cout << "no report.html: " << *no_report << '\n';
+    std::cout << "results: " << arguments.out.string() << '\n';
+    return 0;
+  } catch (const std::exception& error) {
+    std::cerr << "stereo_slam: " << error.what() << '\n';
+    return 2;
+  }
+}

@@ -1,0 +1,147 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "patch_alignment.hpp"
+
+#include <array>
+#include <cmath>
+
+#include <cairn/core/linalg.hpp>
+
+namespace stereo_slam {
+namespace {
+
+constexpr int half = 5;
+constexpr int side = 2 * half + 1;
+constexpr int count = side * side;
+constexpr int most_steps = 12;
+constexpr float farthest = 2.0F;  // [pixels] from the start: beyond it the match itself was wrong
+constexpr float settled = 0.01F;  // [pixels]
+
+/// Grey levels of a patch, row by row; the rest, which fills the vector registers, is zero.
+constexpr int padded = 128;
+using Patch = Eigen::Array<float, padded, 1>;
+
+/// Grey level between pixels, bilinear; the caller keeps (x, y) a pixel away from the rim.
+float sample(cairn::ImageView image, float x, float y) {
+  const int column = static_cast<int>(x);
+  const int line = static_cast<int>(y);
+  const float fx = x - static_cast<float>(column);
+  const float fy = y - static_cast<float>(line);
+  const std::uint8_t* top = image.row(line) + column;
+  const std::uint8_t* bottom = top + image.stride();
+  const float above = static_cast<float>(top[0]) + fx * static_cast<float>(top[1] - top[0]);
+  const float below = static_cast<float>(bottom[0]) + fx * static_cast<float>(bottom[1] - bottom[0]);
+  return above + fy * (below - above);
+}
+
+bool inside(cairn::ImageView image, float x, float y, float margin) {
+  return x >= margin && y >= margin && x < static_cast<float>(image.width()) - 1 - margin &&
+         y < static_cast<float>(image.height()) - 1 - margin;
+}
+
+/// Subtracts the mean; returns the root of the sum of squares that is left.
+float centre(Patch& patch) {
+  const float mean = patch.sum() / count;
+  patch.head<count>() -= mean;
+  return std::sqrt(patch.square().sum());
+}
+
+/// The left patch and what its grey levels do under the four parameters (d_u, d_v, a, b).
+struct Template {
+  Patch grey = Patch::Zero();
+  std::array<Patch, 4> slopes{Patch::Zero(), Patch::Zero(), Patch::Zero(), Patch::Zero()};
+  float norm = 0;
+  Eigen::LDLT<cairn::Matrix<4, 4, float>> normal_equations;
+};
+
+/// Fills grey levels and slopes (central differences) of the patch around (x, y).
+void sample_template(cairn::ImageView image, float x, float y, Template& result) {
+  constexpr int wide = side + 2;
+  std::array<float, wide * wide> grey{};
+  for (int v = 0, i = 0; v < wide; ++v)
+    for (int u = 0; u < wide; ++u, ++i)
+      grey[static_cast<std::size_t>(i)] =
+          sample(image, x + static_cast<float>(u - half - 1), y + static_cast<float>(v - half - 1));
+  for (int v = 0, i = 0; v < side; ++v)
+    for (int u = 0; u < side; ++u, ++i) {
+      const float* at = grey.data() + (v + 1) * wide + u + 1;
+      result.grey(i) = *at;
+      const float slope_x = 0.5F * (at[1] - at[-1]);
+      result.slopes[0](i) = slope_x;
+      result.slopes[1](i) = 0.5F * (at[wide] - at[-wide]);
+      result.slopes[2](i) = slope_x * static_cast<float>(u - half) / half;
+      result.slopes[3](i) = slope_x * static_cast<float>(v - half) / half;
+    }
+}
+
+std::optional<Template> make_template(cairn::ImageView image, float x, float y) {
+  if (!inside(image, x, y, half + 1)) return std::nullopt;
+  Template result;
+  sample_template(image, x, y, result);
+  result.norm = centre(result.grey);
+  for (Patch& slope : result.slopes) centre(slope);
+  cairn::Matrix<4, 4, float> normal;
+  for (int r = 0; r < 4; ++r)
+    for (int c = 0; c <= r; ++c)
+      normal(r, c) = normal(c, r) =
+          (result.slopes[static_cast<std::size_t>(r)] * result.slopes[static_cast<std::size_t>(c)]).sum();
+  constexpr float weakest_gradient = 2.0F;  // [grey levels a pixel] rms: below it noise decides
+  if (!(normal(0, 0) >= weakest_gradient * weakest_gradient * count)) return std::nullopt;
+  // A little of the largest entry keeps the shears from running away on patches that cannot see them.
+  normal.diagonal().array() += 1e-4F * normal.diagonal().maxCoeff();
+  result.normal_equations.compute(normal);
+  return result;
+}
+
+/// The right patch under the warp, centred and scaled to the template's contrast, minus the template.
+bool residual(const Template& reference, cairn::ImageView right, float x, float y,
+              const cairn::Vector<4, float>& warp, Patch& difference) {
+  constexpr float margin = half + 2 * farthest;
+  if (!inside(right, x + warp(0), y + warp(1), margin) || std::abs(warp(2)) > farthest ||
+      std::abs(warp(3)) > farthest)
+    return false;
+  for (int v = -half, i = 0; v <= half; ++v) {
+    const auto fv = static_cast<float>(v);
+    const float row_x = x + warp(0) + warp(3) * fv / half;
+    const float step = 1 + warp(2) / half;
+    for (int u = -half; u <= half; ++u, ++i)
+      difference(i) = sample(right, row_x + step * static_cast<float>(u), y + fv + warp(1));
+  }
+  const float norm = centre(difference);
+  if (!(norm > 0)) return false;
+  difference = difference * (reference.norm / norm) - reference.grey;
+  return true;
+}
+
+}  // namespace
+
+std::optional<PatchAlignment> align_patch(cairn::ImageView left, float left_x, float left_y,
+                                          cairn::ImageView right, float right_x, float right_y) {
+  const auto reference = make_template(left, left_x, left_y);
+  if (!reference) return std::nullopt;
+  cairn::Vector<4, float> warp = cairn::Vector<4, float>::Zero();
+  Patch difference = Patch::Zero();
+  for (int step = 0; step < most_steps; ++step) {
+    if (!residual(*reference, right, right_x, right_y, warp, difference)) return std::nullopt;
+    cairn::Vector<4, float> gradient;
+    for (int r = 0; r < 4; ++r)
+      gradient(r) = (reference->slopes[static_cast<std::size_t>(r)] * difference).sum();
+    const cairn::Vector<4, float> change = reference->normal_equations.solve(gradient);
+    warp -= change;
+    if (!(std::abs(warp(0)) <= farthest && std::abs(warp(1)) <= farthest)) return std::nullopt;
+    if (change.cwiseAbs().maxCoeff() > settled) continue;
+    // Of two unit patches with correlation c the difference has the squared length 2 - 2 c.
+    const float squares = difference.square().sum();
+    const cairn::Vector<4, float> column =
+        reference->normal_equations.solve(cairn::Vector<4, float>::Unit(0));
+    PatchAlignment result;
+    result.x = right_x + warp(0);
+    result.y = right_y + warp(1);
+    result.sigma = std::sqrt(squares / (count - 6) * column(0));
+    result.correlation = 1 - 0.5F * squares / (reference->norm * reference->norm);
+    return result;
+  }
+  return std::nullopt;
+}
+
+}  // namespace stereo_slam

@@ -1,0 +1,83 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// What one run of the stereo SLAM example leaves behind: everything the summary, the map file and the report
+/// show.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/manifold/se3.hpp>
+#include <cairn/vision/image.hpp>
+
+namespace stereo_slam {
+
+/// The stages of one step, in order; names as they stand in summary.json.
+enum class Stage { load, detect, stereo, match, pose, update, store, total };
+inline constexpr std::array<const char*, 8> stage_names{"load", "detect", "stereo", "match",
+                                                        "pose", "update", "store",  "total"};
+
+struct FrameRecord {
+  std::size_t index = 0;            ///< frame number in the data set
+  double time = 0;                  ///< [s]
+  cairn::SE3 T_world_camera;        ///< estimated pose of the left camera; world = first camera
+  cairn::Matrix<6, 6> covariance;   ///< of the pose, tangent at the pose: translation, then rotation
+  std::optional<cairn::SE3> truth;  ///< true T_world_camera in the same world, where the data has it
+  bool tracked = false;
+  int points_left = 0;
+  int points_right = 0;
+  int stereo_matches = 0;
+  int map_matches = 0;
+  int inliers = 0;
+  std::size_t landmarks = 0;  ///< in the map after this frame
+  std::array<double, stage_names.size()> milliseconds{};
+};
+
+struct LandmarkRecord {
+  cairn::Vector<3> position;       ///< [m], world frame
+  cairn::Matrix<3, 3> covariance;  ///< [m^2]
+  std::uint8_t grey = 0;
+  int age = 0;  ///< frames since first seen
+  int sightings = 0;
+};
+
+/// One point of the sample frame: a left-image point, where its partner lies in the right image, and what
+/// became of it.
+struct SamplePoint {
+  enum class Kind {
+    fresh,
+    matched,
+    inlier
+  };  ///< no partner in the map; a partner; a partner the pose agrees with
+  float x = 0, y = 0, right_x = 0, right_y = 0;
+  Kind kind = Kind::fresh;
+};
+
+struct SampleFrame {
+  std::size_t index = 0;
+  cairn::Image left;
+  cairn::Image right;
+  std::vector<SamplePoint> points;
+};
+
+struct RunRecord {
+  std::string dataset;
+  std::string store;
+  std::uint64_t seed = 0;
+  unsigned threads = 1;
+  int target_points = 0;
+  double seconds = 0;  ///< wall time of the whole run
+  std::vector<FrameRecord> frames;
+  std::vector<LandmarkRecord> landmarks;
+  std::optional<SampleFrame> sample;
+  std::vector<std::string> notes;  ///< what the reader should know: skipped frames, lost frames
+};
+
+}  // namespace stereo_slam

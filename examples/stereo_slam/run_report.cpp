@@ -1,0 +1,276 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "run_report.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "image_io.hpp"
+
+namespace stereo_slam {
+namespace {
+
+using example::Ink;
+
+constexpr double degrees = 180.0 / std::numbers::pi;
+constexpr double gap = std::numeric_limits<double>::quiet_NaN();
+
+/// One value a frame.
+template <class Get>
+std::vector<double> over_frames(const RunRecord& run, Get&& get) {
+  std::vector<double> values;
+  values.reserve(run.frames.size());
+  for (const FrameRecord& frame : run.frames) values.push_back(static_cast<double>(get(frame)));
+  return values;
+}
+
+/// The common axis of all plots over time: seconds since the first frame, or frame numbers where the data
+/// set's clock does not run forward.
+struct TimeAxis {
+  example::Axis axis{"time", "s"};
+  std::vector<double> values;
+};
+
+TimeAxis time_axis(const RunRecord& run) {
+  TimeAxis result;
+  const double start = run.frames.front().time;
+  result.values = over_frames(run, [&](const FrameRecord& frame) { return frame.time - start; });
+  const bool runs = std::is_sorted(result.values.begin(), result.values.end()) && result.values.back() > 0 &&
+                    std::isfinite(result.values.back());
+  if (!runs) {
+    result.axis = {"frame", ""};
+    for (std::size_t i = 0; i < result.values.size(); ++i) result.values[i] = static_cast<double>(i);
+  }
+  return result;
+}
+
+/// From the first camera's axes (x right, y down, z ahead) to the report's (x right, y ahead, z up).
+std::array<float, 3> upright(const cairn::Vector<3>& p) {
+  return {static_cast<float>(p(0)), static_cast<float>(p(2)), static_cast<float>(-p(1))};
+}
+
+void add_figures(example::Report& report, const Summary& summary) {
+  using Verdict = example::KeyFigure::Verdict;
+  using example::readable;
+  report.figure({"frames tracked", std::to_string(summary.frames_tracked),
+                 "of " + std::to_string(summary.frames),
+                 summary.frames_lost == 0 ? "none lost" : std::to_string(summary.frames_lost) + " lost",
+                 summary.frames_lost == 0 ? Verdict::good : Verdict::bad});
+  report.figure({"rate", readable(summary.hz), "Hz", "whole run, loading included"});
+  report.figure({"path", readable(summary.path), "m", ""});
+  report.figure({"landmarks", std::to_string(summary.landmarks), "", "in the map at the end"});
+  report.figure({"inliers", readable(summary.inliers), "", "median of a frame"});
+  if (!summary.errors) return;
+  const TruthErrors& errors = *summary.errors;
+  const std::string share =
+      summary.path > 0 ? readable(100.0 * errors.end / summary.path) + " % of the path" : "";
+  report.figure({"end error", readable(errors.end), "m", share});
+  report.figure({"max position error", readable(errors.largest.position), "m", "first poses coincide"});
+  report.figure({"max heading error", readable(errors.largest.heading * degrees), "deg",
+                 "angle of the whole rotation"});
+  report.figure(
+      {"ATE", readable(errors.ate_rmse), "m", "RMSE of positions, alignment: " + errors.ate_alignment});
+  if (errors.kitti_translation_percent)
+    report.figure({"KITTI drift", readable(*errors.kitti_translation_percent), "%", "over 100 to 800 m"});
+  if (errors.revisit)
+    report.figure({"same place again", readable(errors.revisit->position), "m",
+                   "largest disagreement of " + std::to_string(errors.revisit->pairs) + " returns"});
+}
+
+example::PlanePlot path_plot(const RunRecord& run) {
+  example::PlanePlot plot{.title = "Path from above",
+                          .caption = "World of the first camera, which looks towards the top of the page.",
+                          .x = {"right", "m"},
+                          .y = {"ahead", "m"},
+                          .curves = {}};
+  example::PlaneCurve truth{"truth", Ink::truth, {}, {}}, belief{"estimate", Ink::belief, {}, {}},
+      lost{"not tracked", Ink::wrong, {}, {}, true};
+  for (const FrameRecord& frame : run.frames) {
+    const cairn::Vector<3>& estimate = frame.T_world_camera.translation();
+    truth.x.push_back(frame.truth ? frame.truth->translation()(0) : gap);
+    truth.y.push_back(frame.truth ? frame.truth->translation()(2) : gap);
+    belief.x.push_back(estimate(0));
+    belief.y.push_back(estimate(2));
+    if (frame.tracked) continue;
+    lost.x.push_back(estimate(0));
+    lost.y.push_back(estimate(2));
+  }
+  const bool any_truth = std::any_of(run.frames.begin(), run.frames.end(),
+                                     [](const FrameRecord& frame) { return frame.truth.has_value(); });
+  if (any_truth)
+    plot.curves.push_back(std::move(truth));
+  else
+    plot.caption += " This data has no truth to compare with.";
+  plot.curves.push_back(std::move(belief));
+  if (!lost.x.empty()) plot.curves.push_back(std::move(lost));
+  return plot;
+}
+
+/// The error of every frame, in metres or degrees, beside what the covariance claims.
+example::LinePlot error_plot(const RunRecord& run, const TimeAxis& time, bool heading) {
+  example::LinePlot plot{.title = heading ? "Heading error" : "Position error",
+                         .caption = {},
+                         .x = time.axis,
+                         .y = {"error", heading ? "deg" : "m"},
+                         .x_values = time.values,
+                         .curves = {}};
+  const auto error = over_frames(run, [&](const FrameRecord& frame) {
+    if (!frame.truth) return gap;
+    const FrameError e = frame_error(frame.T_world_camera, *frame.truth);
+    return heading ? e.heading * degrees : e.position;
+  });
+  if (std::none_of(error.begin(), error.end(), [](double e) { return std::isfinite(e); })) {
+    plot.caption = "This data has no truth: the error is not known.";
+    return plot;
+  }
+  const auto claimed = over_frames(run, [&](const FrameRecord& frame) {
+    const int first = heading ? 3 : 0;
+    const double variance = frame.covariance.diagonal().segment<3>(first).sum();
+    return variance > 0 ? 3.0 * std::sqrt(variance) * (heading ? degrees : 1.0) : gap;
+  });
+  plot.caption =
+      "Distance from the truth, the first poses coinciding; dashed: three standard deviations of "
+      "the pose measured in this frame.";
+  plot.curves = {{"error", Ink::wrong, error, false}, {"3 sigma", Ink::belief, claimed, true}};
+  return plot;
+}
+
+example::LinePlot match_plot(const RunRecord& run, const TimeAxis& time) {
+  const auto count = [&](int FrameRecord::* member) {
+    return over_frames(run, [&](const FrameRecord& frame) { return frame.*member; });
+  };
+  return {.title = "Points and matches",
+          .caption = "From image points to what the pose rests on.",
+          .x = time.axis,
+          .y = {"count", ""},
+          .x_values = time.values,
+          .curves = {{"points left", Ink::grey, count(&FrameRecord::points_left)},
+                     {"stereo matches", Ink::measurement, count(&FrameRecord::stereo_matches)},
+                     {"map matches", Ink::teal, count(&FrameRecord::map_matches)},
+                     {"inliers", Ink::belief, count(&FrameRecord::inliers)}}};
+}
+
+example::LinePlot landmark_plot(const RunRecord& run, const TimeAxis& time) {
+  return {.title = "Landmarks",
+          .caption = "In the store after each frame.",
+          .x = time.axis,
+          .y = {"landmarks", ""},
+          .x_values = time.values,
+          .curves = {{"landmarks", Ink::belief,
+                      over_frames(run, [](const FrameRecord& frame) { return frame.landmarks; })}}};
+}
+
+example::LinePlot time_plot(const RunRecord& run, const TimeAxis& time) {
+  example::LinePlot plot{.title = "Time of every frame",
+                         .caption = "Logarithmic.",
+                         .x = time.axis,
+                         .y = {"time", "ms"},
+                         .x_values = time.values,
+                         .curves = {},
+                         .logarithmic = true};
+  constexpr std::array<Ink, stage_names.size()> inks{Ink::grey,   Ink::measurement, Ink::wrong,  Ink::teal,
+                                                     Ink::violet, Ink::grey,        Ink::belief, Ink::truth};
+  for (std::size_t stage = 0; stage < stage_names.size(); ++stage)
+    plot.curves.push_back(
+        {stage_names[stage], inks[stage],
+         over_frames(run, [&](const FrameRecord& frame) { return frame.milliseconds[stage]; }),
+         stage == static_cast<std::size_t>(Stage::update)});
+  return plot;
+}
+
+example::BarChart stage_bars(const Summary& summary) {
+  example::BarChart chart{.title = "Time per stage",
+                          .caption = "Thick: the middle frame. Thin: one frame in twenty takes longer.",
+                          .unit = "ms",
+                          .value_name = "median",
+                          .upper_name = "95th percentile",
+                          .bars = {}};
+  for (std::size_t stage = 0; stage < stage_names.size(); ++stage)
+    chart.bars.push_back({stage_names[stage], summary.stages[stage].median, summary.stages[stage].p95});
+  return chart;
+}
+
+example::Cloud map_cloud(const RunRecord& run) {
+  example::Cloud cloud{.title = "Landmarks and path",
+                       .caption = "The map at the end of the run.",
+                       .unit = "m",
+                       .points = {},
+                       .colourings = {{"grey level", "", {}, true},
+                                      {"sightings", "", {}},
+                                      {"age", "frames", {}},
+                                      {"sigma", "m", {}}},
+                       .curves = {},
+                       .wide = true};
+  for (const LandmarkRecord& landmark : run.landmarks) {
+    cloud.points.push_back(upright(landmark.position));
+    cloud.colourings[0].values.push_back(landmark.grey);
+    cloud.colourings[1].values.push_back(landmark.sightings);
+    cloud.colourings[2].values.push_back(landmark.age);
+    cloud.colourings[3].values.push_back(std::sqrt(std::max(0.0, landmark.covariance.trace())));
+  }
+  example::SpaceCurve truth{"truth", Ink::truth, {}}, belief{"estimate", Ink::belief, {}};
+  for (const FrameRecord& frame : run.frames) {
+    belief.points.push_back(upright(frame.T_world_camera.translation()));
+    if (frame.truth) truth.points.push_back(upright(frame.truth->translation()));
+  }
+  if (!truth.points.empty()) cloud.curves.push_back(std::move(truth));
+  cloud.curves.push_back(std::move(belief));
+  return cloud;
+}
+
+example::Picture sample_picture(const RunRecord& run) {
+  example::Picture picture{
+      .title = "One frame with its matches", .caption = "No frame was kept.", .png = {}, .marks = {}};
+  if (!run.sample || run.sample->left.empty()) return picture;
+  const SampleFrame& sample = *run.sample;
+  picture.caption = "Left image of frame " + std::to_string(sample.index) +
+                    ". A line leads from each point to where the right image shows it.";
+  picture.png = png_bytes(sample.left);
+  picture.width = sample.left.width();
+  picture.height = sample.left.height();
+  picture.wide = picture.width > 2 * picture.height;
+  picture.marks = {{"new", Ink::measurement, {}, {}},
+                   {"matched, but not where the pose says", Ink::wrong, {}, {}},
+                   {"matched and agreed upon", Ink::belief, {}, {}}};
+  for (const SamplePoint& point : sample.points) {
+    example::Marks& marks = picture.marks[static_cast<std::size_t>(point.kind)];
+    marks.points.push_back({point.x, point.y});
+    marks.segments.push_back({point.x, point.y, point.right_x, point.right_y});
+  }
+  return picture;
+}
+
+std::string subtitle_of(const RunRecord& run, const Summary& summary) {
+  return std::to_string(summary.frames) + " frames in " + example::readable(summary.seconds) + " s, store " +
+         run.store + ", " + std::to_string(run.target_points) + " points an image, seed " +
+         std::to_string(run.seed) + ", " + std::to_string(run.threads) +
+         (run.threads == 1 ? " thread" : " threads");
+}
+
+}  // namespace
+
+example::Report run_report(const RunRecord& run, const Summary& summary) {
+  example::Report report("Stereo SLAM: " + run.dataset, subtitle_of(run, summary));
+  add_figures(report, summary);
+  for (const std::string& note : run.notes) report.note(note);
+  const TimeAxis time = time_axis(run);
+  report.add(map_cloud(run));
+  report.add(path_plot(run));
+  report.add(sample_picture(run));
+  report.add(error_plot(run, time, false));
+  report.add(error_plot(run, time, true));
+  report.add(match_plot(run, time));
+  report.add(landmark_plot(run, time));
+  report.add(stage_bars(summary));
+  report.add(time_plot(run, time));
+  return report;
+}
+
+}  // namespace stereo_slam

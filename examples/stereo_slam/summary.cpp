@@ -1,0 +1,197 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "summary.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <span>
+
+#include <nlohmann/json.hpp>
+
+#include <cairn/core/check.hpp>
+#include <cairn/core/statistics.hpp>
+#include <cairn/eval/kitti_metric.hpp>
+#include <cairn/eval/trajectory_error.hpp>
+
+namespace stereo_slam {
+namespace {
+
+constexpr double degrees = 180.0 / std::numbers::pi;
+
+double median_over_frames(const RunRecord& run, int FrameRecord::* count) {
+  std::vector<double> values;
+  for (const FrameRecord& frame : run.frames) values.push_back(frame.*count);
+  return cairn::median(std::move(values));
+}
+
+StageTime stage_time(const RunRecord& run, std::size_t stage) {
+  std::vector<double> values;
+  for (const FrameRecord& frame : run.frames) values.push_back(frame.milliseconds[stage]);
+  return {cairn::median(values), cairn::quantile(values, 0.95)};
+}
+
+double path_length(const RunRecord& run) {
+  const bool all_true = std::all_of(run.frames.begin(), run.frames.end(),
+                                    [](const FrameRecord& frame) { return frame.truth.has_value(); });
+  const auto position = [&](const FrameRecord& frame) {
+    return all_true ? frame.truth->translation() : frame.T_world_camera.translation();
+  };
+  double length = 0;
+  for (std::size_t i = 1; i < run.frames.size(); ++i)
+    length += (position(run.frames[i]) - position(run.frames[i - 1])).norm();
+  return length;
+}
+
+TruthErrors errors_against(const std::vector<cairn::PosePair>& pairs) {
+  TruthErrors errors;
+  errors.frames = pairs.size();
+  errors.ate_alignment = "rigid";
+  auto absolute = cairn::absolute_error(pairs, cairn::AlignBy::rigid);
+  if (!absolute) {
+    errors.ate_alignment = "first pose";
+    absolute = cairn::absolute_error(pairs, cairn::AlignBy::first_pose);
+  }
+  errors.ate_rmse = absolute->translation.rmse;
+  if (const auto relative = cairn::relative_error(pairs)) {
+    errors.rpe_translation = relative->translation.rmse;
+    errors.rpe_rotation = relative->rotation.rmse;
+  }
+  if (const auto kitti = cairn::kitti_error(pairs))
+    errors.kitti_translation_percent = kitti->overall.translation_percent();
+  for (const cairn::PosePair& pair : pairs) {
+    const FrameError error = frame_error(pair.estimate, pair.truth);
+    errors.largest.position = std::max(errors.largest.position, error.position);
+    errors.largest.heading = std::max(errors.largest.heading, error.heading);
+    errors.end = error.position;
+  }
+  errors.revisit = revisit_error(pairs);
+  return errors;
+}
+
+/// The pair before j, by more than frames_apart, whose true place is nearest and the same; the first of
+/// equally near ones.
+std::optional<std::size_t> earlier_at_same_place(const std::vector<cairn::PosePair>& pairs, std::size_t j,
+                                                 const RevisitOptions& options) {
+  const double* here = pairs[j].truth.translation().data();
+  std::optional<std::size_t> nearest;
+  double smallest = options.distance * options.distance;
+  for (std::size_t i = 0; i + options.frames_apart < j; ++i) {
+    const double* there = pairs[i].truth.translation().data();
+    const double x = here[0] - there[0], y = here[1] - there[1], z = here[2] - there[2];
+    const double squared = x * x + y * y + z * z;
+    if (squared > smallest || (nearest && squared == smallest)) continue;
+    if ((pairs[i].truth.rotation().inverse() * pairs[j].truth.rotation()).angle() > options.angle) continue;
+    nearest = i;
+    smallest = squared;
+  }
+  return nearest;
+}
+
+using Json = nlohmann::ordered_json;
+
+/// A number, or null where there is none or it is not finite.
+Json number(std::optional<double> value) {
+  return value && std::isfinite(*value) ? Json(*value) : Json(nullptr);
+}
+
+void append_errors(Json& json, const Summary& summary) {
+  const auto& errors = summary.errors;
+  const auto of = [&](auto&& get) -> Json { return errors ? number(get(*errors)) : Json(nullptr); };
+  const auto in_degrees = [](std::optional<double> angle) -> std::optional<double> {
+    return angle ? std::optional(*angle * degrees) : std::nullopt;
+  };
+  json["frames_with_truth"] = errors ? errors->frames : 0;
+  json["ate_rmse_m"] = of([](const TruthErrors& e) { return std::optional(e.ate_rmse); });
+  json["ate_alignment"] = errors ? Json(errors->ate_alignment) : Json(nullptr);
+  json["rpe_trans_m"] = of([](const TruthErrors& e) { return e.rpe_translation; });
+  json["rpe_rot_deg"] = of([&](const TruthErrors& e) { return in_degrees(e.rpe_rotation); });
+  json["kitti_t_rel_percent"] = of([](const TruthErrors& e) { return e.kitti_translation_percent; });
+  json["end_error_m"] = of([](const TruthErrors& e) { return std::optional(e.end); });
+  json["path_m"] = number(summary.path);
+  json["max_position_error_m"] = of([](const TruthErrors& e) { return std::optional(e.largest.position); });
+  json["max_heading_error_deg"] = of([&](const TruthErrors& e) { return in_degrees(e.largest.heading); });
+  const std::optional<RevisitError> revisit = errors ? errors->revisit : std::nullopt;
+  json["revisit_position_m"] = revisit ? number(revisit->position) : Json(nullptr);
+  json["revisit_heading_deg"] = revisit ? number(revisit->heading * degrees) : Json(nullptr);
+  json["revisit_pairs"] = revisit ? revisit->pairs : 0;
+}
+
+}  // namespace
+
+std::vector<cairn::PosePair> truth_pairs(const RunRecord& run) {
+  std::vector<cairn::PosePair> pairs;
+  for (const FrameRecord& frame : run.frames)
+    if (frame.truth) pairs.push_back({frame.time, *frame.truth, frame.T_world_camera});
+  return pairs;
+}
+
+FrameError frame_error(const cairn::SE3& estimate, const cairn::SE3& truth) {
+  return {(estimate.translation() - truth.translation()).norm(),
+          (truth.rotation().inverse() * estimate.rotation()).angle()};
+}
+
+std::optional<RevisitError> revisit_error(const std::vector<cairn::PosePair>& pairs,
+                                          const RevisitOptions& options) {
+  RevisitError result;
+  for (std::size_t j = options.frames_apart + 1; j < pairs.size(); ++j) {
+    const auto i = earlier_at_same_place(pairs, j, options);
+    if (!i) continue;
+    const cairn::PosePair& before = pairs[*i];
+    const FrameError error =
+        frame_error(before.estimate.inverse() * pairs[j].estimate, before.truth.inverse() * pairs[j].truth);
+    result.position = std::max(result.position, error.position);
+    result.heading = std::max(result.heading, error.heading);
+    ++result.pairs;
+  }
+  if (result.pairs == 0) return std::nullopt;
+  return result;
+}
+
+Summary summarise(const RunRecord& run) {
+  if (run.frames.empty()) cairn::raise("summary of a run: expected at least one frame, found none");
+  Summary summary;
+  summary.frames = run.frames.size();
+  for (const FrameRecord& frame : run.frames) summary.frames_tracked += frame.tracked ? 1 : 0;
+  summary.frames_lost = summary.frames - summary.frames_tracked;
+  summary.seconds = run.seconds;
+  summary.hz = run.seconds > 0 ? static_cast<double>(summary.frames) / run.seconds : 0;
+  for (std::size_t stage = 0; stage < stage_names.size(); ++stage)
+    summary.stages[stage] = stage_time(run, stage);
+  summary.points_left = median_over_frames(run, &FrameRecord::points_left);
+  summary.stereo_matches = median_over_frames(run, &FrameRecord::stereo_matches);
+  summary.map_matches = median_over_frames(run, &FrameRecord::map_matches);
+  summary.inliers = median_over_frames(run, &FrameRecord::inliers);
+  summary.landmarks = run.landmarks.size();
+  summary.path = path_length(run);
+  const std::vector<cairn::PosePair> pairs = truth_pairs(run);
+  if (!pairs.empty()) summary.errors = errors_against(pairs);
+  return summary;
+}
+
+std::string summary_json(const RunRecord& run, const Summary& summary) {
+  Json json;
+  json["dataset"] = run.dataset;
+  json["frames"] = summary.frames;
+  json["frames_tracked"] = summary.frames_tracked;
+  json["frames_lost"] = summary.frames_lost;
+  json["seconds"] = number(summary.seconds);
+  json["hz"] = number(summary.hz);
+  for (std::size_t stage = 0; stage < stage_names.size(); ++stage)
+    json["stage_ms"][stage_names[stage]] = {{"median", number(summary.stages[stage].median)},
+                                            {"p95", number(summary.stages[stage].p95)}};
+  json["points_left"] = number(summary.points_left);
+  json["stereo_matches"] = number(summary.stereo_matches);
+  json["map_matches"] = number(summary.map_matches);
+  json["inliers"] = number(summary.inliers);
+  json["landmarks"] = summary.landmarks;
+  append_errors(json, summary);
+  json["store"] = run.store;
+  json["seed"] = run.seed;
+  json["threads"] = run.threads;
+  json["target_points"] = run.target_points;
+  json["notes"] = run.notes;
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace stereo_slam

@@ -1,0 +1,97 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The key figures of a run: how well it tracked, how far it was from the truth, how long each stage took.
+///
+/// Two views of the same error stand side by side. Absolute error (ATE) and relative error (RPE) are what the
+/// literature compares: ATE after the rigid fit of all positions, RPE between successive frames. Everything
+/// named "max", "end" and "revisit" is what a user sees who starts at a known place: estimate and truth share
+/// the first pose and nothing is fitted afterwards.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <cairn/eval/association.hpp>
+
+#include "run_record.hpp"
+
+namespace stereo_slam {
+
+/// Middle and 95th percentile of a stage's time over the frames [ms].
+struct StageTime {
+  double median = 0;
+  double p95 = 0;
+};
+
+/// Distance from the truth of one frame: what the summary takes the largest of and the report plots.
+struct FrameError {
+  double position = 0;  ///< [m]
+  double heading = 0;  ///< angle of the whole rotation error [rad]: never less than that of the heading alone
+};
+
+/// The frame at the same true place as an earlier one where the relative estimate differs most.
+struct RevisitError {
+  double position = 0;    ///< [m]
+  double heading = 0;     ///< [rad]
+  std::size_t pairs = 0;  ///< that were compared
+};
+
+struct RevisitOptions {
+  std::size_t frames_apart = 20;         ///< a return is later by more than so many frames
+  double distance = 0.05;                ///< the same place: true positions within [m]
+  double angle = std::numbers::pi / 90;  ///< and true attitudes within [rad], two degrees
+};
+
+/// Errors against the truth; only where frames have it.
+struct TruthErrors {
+  std::size_t frames = 0;                           ///< that have a truth
+  double ate_rmse = 0;                              ///< [m], positions, after the alignment named next
+  std::string ate_alignment;                        ///< "rigid", or "first pose" where all positions are one
+  std::optional<double> rpe_translation;            ///< RMSE between successive frames [m]
+  std::optional<double> rpe_rotation;               ///< [rad]
+  std::optional<double> kitti_translation_percent;  ///< nothing when the path is under 100 m
+  double end = 0;                                   ///< distance at the last frame with a truth [m]
+  FrameError largest;                               ///< largest of each over all frames
+  std::optional<RevisitError> revisit;              ///< nothing when no place is visited twice
+};
+
+struct Summary {
+  std::size_t frames = 0;
+  std::size_t frames_tracked = 0;
+  std::size_t frames_lost = 0;
+  double seconds = 0;
+  double hz = 0;  ///< frames per second of the whole run, loading included
+  std::array<StageTime, stage_names.size()> stages{};
+  double points_left = 0;  ///< median over frames, as the next three
+  double stereo_matches = 0;
+  double map_matches = 0;
+  double inliers = 0;
+  std::size_t landmarks = 0;
+  double path = 0;  ///< [m], of the truth where every frame has one, otherwise of the estimate
+  std::optional<TruthErrors> errors;
+};
+
+/// The frames that have a truth, in order.
+[[nodiscard]] std::vector<cairn::PosePair> truth_pairs(const RunRecord& run);
+
+/// Distance of an estimated pose from the true one.
+[[nodiscard]] FrameError frame_error(const cairn::SE3& estimate, const cairn::SE3& truth);
+
+/// For every pose the nearest earlier one at the same true place, compared by
+/// E = (P_i^-1 P_j)^-1 (Q_i^-1 Q_j), P estimate, Q truth; nothing when there is none. O(n^2), 0.1 s for 4000.
+[[nodiscard]] std::optional<RevisitError> revisit_error(const std::vector<cairn::PosePair>& pairs,
+                                                        const RevisitOptions& options = {});
+
+/// The key figures of a run with at least one frame. Throws cairn::Error without frames.
+[[nodiscard]] Summary summarise(const RunRecord& run);
+
+/// summary.json of a run: SI units as the keys say, null where nothing is known.
+[[nodiscard]] std::string summary_json(const RunRecord& run, const Summary& summary);
+
+}  // namespace stereo_slam

@@ -1,0 +1,197 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// A result as one HTML page: key figures on top, then panels with plots, pictures, tables and point clouds.
+///
+/// The page needs no network: its script and style (report_page/, built with npm) are part of the program,
+/// and the numbers are put into it as JSON. Colours carry meaning, see Ink. Values that are not finite leave
+/// a gap in a plot.
+///
+///   example::Report report("Kalman filter", "one run of 400 steps");
+///   report.figure({"RMSE", "0.12", "m"});
+///   report.add(example::LinePlot{.title = "Error", .x = {"time", "s"}, .y = {"error", "m"}, ...});
+///   if (const auto html = report.html()) cairn::write_file_atomically(path, *html);
+///   else std::cerr << example::why_no_report() << '\n';
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace example {
+
+/// What a line or a point stands for. Truth is black (white on dark), belief blue, measurement orange, what
+/// went wrong red; grey is context, and teal and violet are for quantities of no such role.
+enum class Ink { truth, belief, measurement, wrong, grey, teal, violet };
+
+/// A number that sums up the result.
+struct KeyFigure {
+  enum class Verdict { none, good, bad };
+  std::string label;
+  std::string value;  ///< as it is to be read: "0.012"
+  std::string unit = {};
+  std::string hint = {};  ///< a sentence on how it is measured
+  Verdict verdict = Verdict::none;
+};
+
+/// What an axis measures; the unit may be empty.
+struct Axis {
+  std::string label = {};
+  std::string unit = {};
+};
+
+/// One curve over the common x values of a LinePlot.
+struct Curve {
+  std::string name = {};
+  Ink ink = Ink::belief;
+  std::vector<double> values = {};  ///< one for each x value
+  bool dashed = false;
+};
+
+/// Curves over a common axis. The mouse reads values, a dragged range zooms, a double click returns.
+struct LinePlot {
+  std::string title = {};
+  std::string caption = {};
+  Axis x = {};
+  Axis y = {};
+  std::vector<double> x_values = {};  ///< never falling
+  std::vector<Curve> curves = {};     ///< none: the panel shows its caption only
+  bool logarithmic = false;           ///< the y axis; values that are not positive leave gaps
+  bool wide = false;                  ///< over the whole width of the page
+};
+
+/// A line through the plane, or single dots.
+struct PlaneCurve {
+  std::string name = {};
+  Ink ink = Ink::belief;
+  std::vector<double> x = {};
+  std::vector<double> y = {};
+  bool dots = false;
+};
+
+/// Curves in a plane whose two axes have the same scale: a map.
+struct PlanePlot {
+  std::string title = {};
+  std::string caption = {};
+  Axis x = {};
+  Axis y = {};
+  std::vector<PlaneCurve> curves = {};
+  bool wide = false;
+};
+
+/// Things drawn over a picture, in its pixels; the reader can hide them by name.
+struct Marks {
+  std::string name = {};
+  Ink ink = Ink::belief;
+  std::vector<std::array<float, 2>> points = {};
+  std::vector<std::array<float, 4>> segments = {};  ///< from x, y to x, y
+};
+
+/// An image of width x height pixels with marks on it.
+struct Picture {
+  std::string title = {};
+  std::string caption = {};
+  std::string png = {};  ///< the bytes of a PNG file
+  int width = 0;
+  int height = 0;
+  std::vector<Marks> marks = {};
+  bool wide = false;
+};
+
+/// A bar with a thin one behind it: a usual value and an upper one.
+struct Bar {
+  std::string name = {};
+  double value = 0;
+  double upper = 0;
+};
+
+/// Horizontal bars on a common scale.
+struct BarChart {
+  std::string title = {};
+  std::string caption = {};
+  std::string unit = {};
+  std::string value_name = {};  ///< "median"
+  std::string upper_name = {};  ///< "95th percentile"
+  std::vector<Bar> bars = {};
+  bool wide = false;
+};
+
+struct Table {
+  std::string title = {};
+  std::string caption = {};
+  std::vector<std::string> columns = {};
+  std::vector<std::vector<std::string>> rows = {};
+  bool wide = false;
+};
+
+/// Values to colour a cloud by.
+struct Colouring {
+  std::string name = {};
+  std::string unit = {};
+  std::vector<double> values = {};  ///< one a point
+  bool grey = false;                ///< values 0..255 shown as grey levels; otherwise dark violet to yellow
+};
+
+/// A line through a cloud.
+struct SpaceCurve {
+  std::string name = {};
+  Ink ink = Ink::belief;
+  std::vector<std::array<float, 3>> points = {};
+};
+
+/// Points and lines in space, right-handed with z up, turned with the mouse. Points that are not finite are
+/// left out.
+struct Cloud {
+  std::string title = {};
+  std::string caption = {};
+  std::string unit = {};
+  std::vector<std::array<float, 3>> points = {};
+  std::vector<Colouring> colourings = {};  ///< the first is shown first
+  std::vector<SpaceCurve> curves = {};
+  bool wide = false;
+};
+
+/// The page being put together; panels appear in the order of adding. A promise of the panels' comments that
+/// is broken (values without an x value, say) throws cairn::Error naming the panel.
+class Report {
+public:
+  Report(std::string title, std::string subtitle);
+
+  void figure(KeyFigure figure);
+  /// A sentence that the reader should not miss.
+  void note(std::string sentence);
+
+  void add(const LinePlot& panel);
+  void add(const PlanePlot& panel);
+  void add(const Picture& panel);
+  void add(const BarChart& panel);
+  void add(const Table& panel);
+  void add(const Cloud& panel);
+
+  /// Everything as JSON, as the page reads it.
+  [[nodiscard]] std::string data() const;
+
+  /// The finished page; nothing where the program was built without the page (see why_no_report).
+  [[nodiscard]] std::optional<std::string> html() const;
+
+private:
+  std::string title_;
+  std::string subtitle_;
+  std::vector<KeyFigure> figures_;
+  std::vector<std::string> notes_;
+  std::vector<std::string> panels_;  // each the text of a JSON object
+};
+
+/// True where html() gives a page.
+[[nodiscard]] bool has_report_page() noexcept;
+
+/// One line that says why there is no report and how to get one.
+[[nodiscard]] std::string why_no_report();
+
+/// A number in at most `digits` significant digits, for figures and tables: "0.0123", "1.2e-05"; up to a
+/// million all digits before the point, "12345"; "none" where it is not finite.
+[[nodiscard]] std::string readable(double value, int digits = 3);
+
+}  // namespace example

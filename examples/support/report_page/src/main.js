@@ -1,0 +1,56 @@
+// The page: title, key figures, notes and panels, from the JSON in the element "data".
+import { cloud } from './cloud.js';
+import { element } from './dom.js';
+import { bars, picture, table } from './plain.js';
+import { lines, plane } from './plots.js';
+import { startTheme, toggleTheme } from './theme.js';
+
+const kinds = {
+  lines: { draw: lines, empty: (panel) => panel.curves.length === 0 || panel.x_values.length === 0 },
+  plane: { draw: plane, empty: (panel) => panel.curves.every((curve) => curve.x.length === 0) },
+  picture: { draw: picture, empty: (panel) => panel.png === '' },
+  bars: { draw: bars, empty: (panel) => panel.bars.length === 0 },
+  table: { draw: table, empty: (panel) => panel.rows.length === 0 },
+  cloud: { draw: cloud, empty: (panel) => panel.points === '' && panel.curves.every((curve) => curve.points === '') },
+};
+
+function head(data) {
+  const button = element('button', { type: 'button', ariaLabel: 'Switch between light and dark' }, 'light / dark');
+  button.addEventListener('click', toggleTheme);
+  return element('header', {}, element('div', {}, element('h1', {}, data.title), element('p', {}, data.subtitle)), button);
+}
+
+function figures(data) {
+  const cells = data.figures.map((figure) => element('div', { className: `figure ${figure.verdict}` },
+    element('dt', {}, figure.label),
+    element('dd', {}, figure.value, figure.unit ? element('small', {}, figure.unit) : null),
+    figure.hint ? element('span', { className: 'hint' }, figure.hint) : null));
+  return element('dl', { className: 'figures' }, ...cells);
+}
+
+function notes(data) {
+  if (data.notes.length === 0) return null;
+  return element('ul', { className: 'notes' }, ...data.notes.map((note) => element('li', {}, note)));
+}
+
+function show(panel, grid) {
+  const body = element('div', { className: 'body' });
+  const card = element('section', { className: panel.wide ? 'panel wide' : 'panel' }, element('h2', {}, panel.title),
+    panel.caption ? element('p', {}, panel.caption) : null, body);
+  grid.append(card);
+  const kind = kinds[panel.kind];
+  if (kind.empty(panel)) {
+    if (panel.caption === '') body.append(element('div', { className: 'empty' }, 'nothing to show'));
+    return;
+  }
+  kind.draw(panel, body);
+}
+
+startTheme();
+const data = JSON.parse(document.getElementById('data').textContent);
+const page = document.getElementById('page');
+const grid = element('div', { className: 'panels' });
+page.append(...[head(data), figures(data), notes(data), grid].filter((part) => part !== null));
+for (const panel of data.panels) show(panel, grid);
+// A test reads this: every panel was drawn and nothing was thrown on the way.
+document.documentElement.dataset.panels = data.panels.length;

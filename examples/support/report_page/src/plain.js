@@ -1,0 +1,63 @@
+// Panels that need no library: pictures with marks, bars, tables.
+import { element, floats, readable, switchable } from './dom.js';
+
+const svgSpace = 'http://www.w3.org/2000/svg';
+
+function svgPath(data, width) {
+  const path = document.createElementNS(svgSpace, 'path');
+  path.setAttribute('d', data);
+  path.setAttribute('stroke-width', width);
+  return path;
+}
+
+function pathOfPoints(numbers) {
+  let data = '';
+  for (let i = 0; i < numbers.length; i += 2) data += `M${numbers[i].toFixed(1)} ${numbers[i + 1].toFixed(1)}h0`;
+  return data;
+}
+
+function pathOfSegments(numbers) {
+  let data = '';
+  for (let i = 0; i < numbers.length; i += 4)
+    data += `M${numbers[i].toFixed(1)} ${numbers[i + 1].toFixed(1)}L${numbers[i + 2].toFixed(1)} ${numbers[i + 3].toFixed(1)}`;
+  return data;
+}
+
+export function picture(panel, body) {
+  const svg = document.createElementNS(svgSpace, 'svg');
+  svg.setAttribute('viewBox', `-0.5 -0.5 ${panel.width} ${panel.height}`); // centres of pixels are integers
+  svg.setAttribute('preserveAspectRatio', 'none');
+  const keys = panel.marks.map((marks) => {
+    const group = document.createElementNS(svgSpace, 'g');
+    group.style.setProperty('--ink', `var(--${marks.ink})`);
+    group.append(svgPath(pathOfSegments(floats(marks.segments)), 1.2), svgPath(pathOfPoints(floats(marks.points)), 4.5));
+    svg.append(group);
+    return switchable(`${marks.name} (${marks.count})`, marks.ink, (show) => (group.style.display = show ? '' : 'none'), 'dots');
+  });
+  const image = element('img', { alt: panel.title, width: panel.width, height: panel.height, src: `data:image/png;base64,${panel.png}` });
+  body.append(element('div', { className: 'picture' }, image, svg), element('div', { className: 'bar onpicture' }, ...keys));
+}
+
+export function bars(panel, body) {
+  const largest = panel.bars.reduce((most, bar) => Math.max(most, bar.value ?? 0, bar.upper ?? 0), 0) || 1;
+  const share = (value) => `${(100 * Math.max(0, value ?? 0)) / largest}%`;
+  const rows = panel.bars.flatMap((bar) => [
+    element('span', {}, bar.name),
+    element('div', { className: 'track' },
+      element('i', { className: 'upper', style: { width: share(bar.upper) } }),
+      element('i', { style: { width: share(bar.value) } })),
+    element('output', {}, `${readable(bar.value)} / ${readable(bar.upper)}`),
+  ]);
+  const caption = element('span', { style: { color: 'var(--soft)' } }, `${panel.value_name} / ${panel.upper_name} [${panel.unit}]`);
+  body.append(element('div', { className: 'bars' }, ...rows), element('div', { className: 'bar' }, element('span', { className: 'spread' }), caption));
+}
+
+export function table(panel, body) {
+  const numeric = panel.columns.map((_, column) =>
+    panel.rows.length > 0 && panel.rows.every((row) => row[column] === '' || Number.isFinite(Number(row[column]))));
+  const line = (tag, cells) => element('tr', {}, ...cells.map((cell, i) => element(tag, { className: numeric[i] ? 'number' : '' }, cell)));
+  body.append(element('div', { className: 'scroll' },
+    element('table', { className: 'cells' },
+      element('thead', {}, line('th', panel.columns)),
+      element('tbody', {}, ...panel.rows.map((row) => line('td', row))))));
+}

@@ -1,0 +1,46 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The only door to Eigen: the vector and matrix names that every other header uses.
+///
+/// Only Eigen/Core and Eigen/Cholesky come in here. A header that needs another decomposition includes it
+/// itself (geometry/alignment.hpp takes Eigen/SVD), so that the price of #include stays with those who use
+/// it.
+#pragma once
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// Size known only at run time.
+inline constexpr int dynamic = Eigen::Dynamic;
+
+/// Column vector of N numbers (cairn::dynamic for run-time size).
+template <int N, class Scalar = double>
+using Vector = Eigen::Matrix<Scalar, N, 1>;
+
+/// Matrix of R rows and C columns.
+template <int R, int C = R, class Scalar = double>
+using Matrix = Eigen::Matrix<Scalar, R, C>;
+
+/// (A + A^T) / 2: removes the asymmetry that rounding left in a covariance.
+template <class Derived>
+[[nodiscard]] auto symmetrised(const Eigen::MatrixBase<Derived>& a) {
+  using Scalar = typename Derived::Scalar;
+  return (Scalar(0.5) * (a + a.transpose())).eval();
+}
+
+/// Skew-symmetric matrix of w: skew(w) * v = w x v.
+template <class Derived>
+[[nodiscard]] Matrix<3, 3, typename Derived::Scalar> skew(const Eigen::MatrixBase<Derived>& w) {
+  using Scalar = typename Derived::Scalar;
+  Matrix<3, 3, Scalar> result;
+  result << Scalar(0), -w(2), w(1), w(2), Scalar(0), -w(0), -w(1), w(0), Scalar(0);
+  return result;
+}
+
+}  // namespace cairn::inline CAIRN_ABI

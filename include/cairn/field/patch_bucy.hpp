@@ -1,0 +1,180 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The founding document's estimator: the extended Kalman-Bucy filter in information form, integrated.
+///
+///   dX/dt     = f(X, u) + P H^T S^-1 (z(t) - h(X)),      P = Sigma^-1                              (1)
+///   dSigma/dt = H^T S^-1 H - Sigma A - A^T Sigma - Sigma Q Sigma,      A = df/dX                   (2)
+/// with H = dh/dX at the estimate, S = S_0 I the spectral density of the samples' noise and Q that of the
+/// states' (zero in the document, whose A has the other sign). filter/kalman_bucy.hpp is the same filter for
+/// any sensor in fixed steps; this one knows that a frame is a thousand samples of one field. Integrated by
+/// the pair of orders 5 and 4 of J. Dormand, P. Prince ("A family of embedded Runge-Kutta formulae", 1980)
+/// with step control: the gain is large at the start and falls like 1/t, so no fixed step serves both ends.
+///
+/// A frame that arrives at one instant is an impulse: (1) and (2) without the motion over a unit of
+/// artificial time, with the frame's covariance in place of S. In the linear case that is exactly the Kalman
+/// update; impulses and integration over the frame interval with S_0 = variance * interval agree to first
+/// order in the interval.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <span>
+
+#include <cairn/core/check.hpp>
+#include <cairn/core/linalg.hpp>
+#include <cairn/field/patch_filter.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/kalman_bucy.hpp>
+#include <cairn/filter/model.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+namespace detail {
+
+/// Integrates y' = slope(t, y) from t to end in place. `scales(y)` gives the size of y that an error is
+/// compared with; slope returns false to give up. Returns the number of steps, or 0 on failure.
+template <class Vec, class Slope, class Scales>
+int dormand_prince(Vec& y, double t, double end, double tolerance, int most_steps, Slope&& slope,
+                   Scales&& scales) {
+  static constexpr double c[7] = {0, 1.0 / 5, 3.0 / 10, 4.0 / 5, 8.0 / 9, 1, 1};
+  static constexpr double a[7][6] = {
+      {},
+      {1.0 / 5},
+      {3.0 / 40, 9.0 / 40},
+      {44.0 / 45, -56.0 / 15, 32.0 / 9},
+      {19372.0 / 6561, -25360.0 / 2187, 64448.0 / 6561, -212.0 / 729},
+      {9017.0 / 3168, -355.0 / 33, 46732.0 / 5247, 49.0 / 176, -5103.0 / 18656},
+      {35.0 / 384, 0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84}};
+  static constexpr double difference[7] = {71.0 / 57600,      0,          -71.0 / 16695, 71.0 / 1920,
+                                           -17253.0 / 339200, 22.0 / 525, -1.0 / 40};
+  std::array<Vec, 7> k;
+  if (!slope(t, y, k[0])) return 0;
+  double step = (end - t) / 16.0;
+  for (int steps = 1; steps <= most_steps; ++steps) {
+    step = std::min(step, end - t);
+    Vec next;
+    bool good = true;
+    for (std::size_t stage = 1; stage < 7 && good; ++stage) {
+      next = y;
+      for (std::size_t j = 0; j < stage; ++j) next += (step * a[stage][j]) * k[j];
+      good = slope(t + c[stage] * step, next, k[stage]);
+    }
+    double worst = 1e3;
+    if (good) {
+      Vec error = Vec::Zero();
+      for (std::size_t j = 0; j < 7; ++j) error += (step * difference[j]) * k[j];
+      worst = (error.cwiseAbs().cwiseQuotient(scales(y))).maxCoeff() / tolerance;
+    }
+    if (worst <= 1.0) {
+      t += step;
+      y = next;
+      k[0] = k[6];  // the last stage is the first of the next step
+      if (!(t < end - 1e-12 * std::abs(end))) return steps;
+    }
+    step *= std::clamp(0.9 * std::pow(std::max(worst, 1e-10), -0.2), 0.2, 5.0);
+    if (!(std::abs(step) > 1e-14 * std::max(std::abs(t), std::abs(end)))) return 0;
+  }
+  return 0;
+}
+
+}  // namespace detail
+
+namespace detail {
+
+/// A process in which nothing moves.
+template <class X>
+struct Standstill {
+  using State = X;
+  using Control = NoControl;
+  using Square = CovarianceOf<X>;
+  [[nodiscard]] X rate(const X&, const Control&) const { return X::Zero(); }
+  [[nodiscard]] Square rate_jacobian(const X&, const Control&) const { return Square::Zero(); }
+  [[nodiscard]] Square spectral_density(const X&, const Control&) const { return Square::Zero(); }
+};
+
+}  // namespace detail
+
+/// The continuous filter; holds options only.
+struct PatchBucy {
+  double tolerance = 1e-9;  ///< of a step's error, in sigmas and relative to the information
+  int most_steps = 10000;
+
+  /// Integrates the belief from time t to `end`, with frame_at(time) the frame seen then (anything a
+  /// span of shape.size() numbers comes from) and `density` the spectral density of the samples' noise
+  /// [unit^2 s]. `accepted`, or the belief as it was: outside, flat or not_finite frames, and
+  /// not_positive_definite when the integration fails.
+  template <ContinuousProcess Motion, FramePlacement Placement, FieldInterpolant Map, class FrameAt>
+  PatchVerdict integrate(Gaussian<typename Placement::State>& belief, const Motion& motion,
+                         const typename Motion::Control& control, const Placement& where, const Map& map,
+                         const PatchShape& shape, FrameAt&& frame_at, double density, double t, double end,
+                         PatchScratch& scratch) const;
+
+  /// Takes in one frame of samples with noise of this variance, at an instant.
+  template <FramePlacement Placement, FieldInterpolant Map>
+  PatchVerdict impulse(Gaussian<typename Placement::State>& belief, const Placement& where, const Map& map,
+                       const PatchShape& shape, std::span<const double> z, double variance,
+                       PatchScratch& scratch) const {
+    return integrate(
+        belief, detail::Standstill<typename Placement::State>{}, NoControl{}, where, map, shape,
+        [z](double) { return z; }, variance, 0.0, 1.0, scratch);
+  }
+};
+
+template <ContinuousProcess Motion, FramePlacement Placement, FieldInterpolant Map, class FrameAt>
+PatchVerdict PatchBucy::integrate(Gaussian<typename Placement::State>& belief, const Motion& motion,
+                                  const typename Motion::Control& control, const Placement& where,
+                                  const Map& map, const PatchShape& shape, FrameAt&& frame_at, double density,
+                                  double t, double end, PatchScratch& scratch) const {
+  constexpr int N = Placement::State::RowsAtCompileTime;
+  CAIRN_EXPECTS(density > 0.0 && end >= t, "the Kalman-Bucy filter needs a density above 0 and end >= start");
+  using Packed = Vector<N + N * N>;
+  if (!(end > t)) return PatchVerdict::accepted;
+  const Eigen::LLT<Matrix<N>> prior(belief.covariance);
+  if (prior.info() != Eigen::Success) return PatchVerdict::not_positive_definite;
+  Packed y;
+  y << belief.mean, prior.solve(Matrix<N>::Identity()).reshaped();
+  const PatchFilter linearise{};
+  const PatchNoise noise(density);
+  PatchVerdict verdict = PatchVerdict::accepted;
+  const auto slope = [&](double time, const Packed& at, Packed& result) {
+    const Vector<N> x = at.template head<N>();
+    const Matrix<N> sigma = at.template tail<N * N>().reshaped(N, N);
+    const Eigen::LLT<Matrix<N>> factor(sigma);
+    PatchGram frame;
+    verdict = !at.allFinite() || factor.info() != Eigen::Success
+                  ? PatchVerdict::not_positive_definite
+                  : linearise.gram(map, shape, where.placement(x), frame_at(time), noise, scratch, frame);
+    if (verdict == PatchVerdict::accepted && !frame.gradient.allFinite()) verdict = PatchVerdict::not_finite;
+    if (verdict != PatchVerdict::accepted) return false;
+    const auto J = where.jacobian(x);
+    const Matrix<N> A = motion.rate_jacobian(x, control);
+    result.template head<N>() =
+        motion.rate(x, control) + factor.solve(J.transpose() * frame.gradient);  // (1)
+    const Matrix<N> rate = J.transpose() * frame.information * J - sigma * A - A.transpose() * sigma -
+                           sigma * motion.spectral_density(x, control) * sigma;  // (2)
+    result.template tail<N * N>() = rate.reshaped();
+    return true;
+  };
+  const auto scales = [](const Packed& at) {
+    const Matrix<N> sigma = at.template tail<N * N>().reshaped(N, N);
+    const Vector<N> root = sigma.diagonal().cwiseSqrt();
+    Packed result;
+    result << root.cwiseInverse(), (root * root.transpose()).reshaped();
+    return result;
+  };
+  if (detail::dormand_prince(y, t, end, tolerance, most_steps, slope, scales) == 0)
+    return verdict == PatchVerdict::accepted ? PatchVerdict::not_positive_definite : verdict;
+  const Matrix<N> sigma = symmetrised(y.template tail<N * N>().reshaped(N, N));
+  const Eigen::LLT<Matrix<N>> posterior(sigma);
+  if (posterior.info() != Eigen::Success) return PatchVerdict::not_positive_definite;
+  belief.mean = y.template head<N>();
+  belief.covariance = symmetrised(posterior.solve(Matrix<N>::Identity()));
+  return PatchVerdict::accepted;
+}
+
+}  // namespace cairn::inline CAIRN_ABI

@@ -1,0 +1,210 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The models of correlation navigation: how the vehicle moves and where its sensor's frame lies.
+///
+///   along track   X = [x, V, L_x, L_y, psi]              the founding document's state: flight along x
+///   in the plane  X = [x, y, v_x, v_y, L_x, L_y, psi]    any flight; (v_x, v_y) is what dead reckoning
+///   misses
+///
+/// L_x, L_y are the true distances between samples, unknown because height and attitude are not exact; psi
+/// is the error of the heading. A placement maps a state to a PatchPlacement and gives its derivative:
+///   d(x, y, along_x, along_y, across_x, across_y) / dX, a 6 x n matrix J.
+/// With w = (f_x, f_y, a f_x, a f_y, b f_x, b f_y) of sample (a, b) the row of the measurement's Jacobian is
+/// w J: whatever the state, a frame is linearised by the same six numbers a sample.
+///
+/// One placement serves every filter: PatchFilter directly, and through PatchSensor the filters of filter/.
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <limits>
+#include <optional>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/field/patch.hpp>
+#include <cairn/filter/model.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// A state that says where the frame lies, and how that changes with the state.
+template <class P>
+concept FramePlacement = requires(const P& p, const typename P::State& x) {
+  { p.placement(x) } -> std::convertible_to<PatchPlacement>;
+  { p.jacobian(x) } -> std::convertible_to<Matrix<6, P::State::RowsAtCompileTime>>;
+};
+
+/// Spectral densities of the white noises that drive the states; zero for constants.
+struct TrackNoise {
+  double velocity = 0;  ///< [m^2/s^3]
+  double scale = 0;     ///< [m^2/s]
+  double heading = 0;   ///< [rad^2/s]
+};
+
+/// x' = V; V, L_x, L_y, psi constant but for their noise.
+struct AlongTrackMotion {
+  using State = Vector<5>;
+  using Control = NoControl;
+  static constexpr bool linear = true;
+  TrackNoise density{};
+
+  // In continuous time (ContinuousProcess of filter/kalman_bucy.hpp).
+  [[nodiscard]] State rate(const State& x, const Control&) const { return x(1) * State::Unit(0); }
+  [[nodiscard]] Matrix<5> rate_jacobian(const State&, const Control&) const {
+    Matrix<5> F = Matrix<5>::Zero();
+    F(0, 1) = 1.0;
+    return F;
+  }
+  [[nodiscard]] Matrix<5> spectral_density(const State&, const Control&) const {
+    return Vector<5>(0.0, density.velocity, density.scale, density.scale, density.heading).asDiagonal();
+  }
+
+  [[nodiscard]] State propagate(const State& x, const Control&, double dt) const {
+    State next = x;
+    next(0) += x(1) * dt;
+    return next;
+  }
+  [[nodiscard]] Matrix<5> jacobian(const State&, const Control&, double dt) const {
+    Matrix<5> F = Matrix<5>::Identity();
+    F(0, 1) = dt;
+    return F;
+  }
+  [[nodiscard]] Matrix<5> noise(const State&, const Control&, double dt) const {
+    Matrix<5> Q = Matrix<5>::Zero();
+    Q(0, 0) = density.velocity * dt * dt * dt / 3.0;
+    Q(0, 1) = Q(1, 0) = density.velocity * dt * dt / 2.0;
+    Q(1, 1) = density.velocity * dt;
+    Q(2, 2) = Q(3, 3) = density.scale * dt;
+    Q(4, 4) = density.heading * dt;
+    return Q;
+  }
+};
+
+/// (x, y)' = u + (v_x, v_y) with the dead-reckoned ground velocity u as control.
+struct PlanarMotion {
+  using State = Vector<7>;
+  using Control = Vector<2>;
+  static constexpr bool linear = true;
+  TrackNoise density{};
+
+  // In continuous time.
+  [[nodiscard]] State rate(const State& x, const Control& u) const {
+    State result = State::Zero();
+    result.head<2>() = u + x.segment<2>(2);
+    return result;
+  }
+  [[nodiscard]] Matrix<7> rate_jacobian(const State&, const Control&) const {
+    Matrix<7> F = Matrix<7>::Zero();
+    F(0, 2) = F(1, 3) = 1.0;
+    return F;
+  }
+  [[nodiscard]] Matrix<7> spectral_density(const State&, const Control&) const {
+    Vector<7> q;
+    q << 0.0, 0.0, density.velocity, density.velocity, density.scale, density.scale, density.heading;
+    return q.asDiagonal();
+  }
+
+  [[nodiscard]] State propagate(const State& x, const Control& u, double dt) const {
+    State next = x;
+    next.head<2>() += (u + x.segment<2>(2)) * dt;
+    return next;
+  }
+  [[nodiscard]] Matrix<7> jacobian(const State&, const Control&, double dt) const {
+    Matrix<7> F = Matrix<7>::Identity();
+    F(0, 2) = F(1, 3) = dt;
+    return F;
+  }
+  [[nodiscard]] Matrix<7> noise(const State&, const Control&, double dt) const {
+    Matrix<7> Q = Matrix<7>::Zero();
+    for (int i = 0; i < 2; ++i) {
+      Q(i, i) = density.velocity * dt * dt * dt / 3.0;
+      Q(i, i + 2) = Q(i + 2, i) = density.velocity * dt * dt / 2.0;
+      Q(i + 2, i + 2) = density.velocity * dt;
+    }
+    Q(4, 4) = Q(5, 5) = density.scale * dt;
+    Q(6, 6) = density.heading * dt;
+    return Q;
+  }
+};
+
+/// The document's placement, for small psi: sample (a, b) lies at (x + a L_x - b L_y psi, y + a L_x psi +
+/// b L_y), on a flight along x at a known y.
+struct AlongTrackPlacement {
+  using State = Vector<5>;
+  double y = 0;  ///< [m]
+
+  [[nodiscard]] PatchPlacement placement(const State& x) const {
+    return {x(0), y, x(2), x(2) * x(4), -x(3) * x(4), x(3)};
+  }
+  [[nodiscard]] Matrix<6, 5> jacobian(const State& x) const {
+    Matrix<6, 5> J = Matrix<6, 5>::Zero();
+    J(0, 0) = 1.0;
+    J(2, 2) = 1.0;
+    J(3, 2) = x(4);
+    J(3, 4) = x(2);
+    J(4, 3) = -x(4);
+    J(4, 4) = -x(3);
+    J(5, 3) = 1.0;
+    return J;
+  }
+};
+
+/// Any flight: the frame is turned by the heading that the vehicle believes in plus the error psi.
+struct PlanarPlacement {
+  using State = Vector<7>;
+  double heading = 0;  ///< believed, from the x axis [rad]
+
+  [[nodiscard]] PatchPlacement placement(const State& x) const {
+    return PatchPlacement::of(x(0), x(1), x(4), x(5), heading + x(6));
+  }
+  [[nodiscard]] Matrix<6, 7> jacobian(const State& x) const {
+    const double c = std::cos(heading + x(6)), s = std::sin(heading + x(6));
+    Matrix<6, 7> J = Matrix<6, 7>::Zero();
+    J(0, 0) = J(1, 1) = 1.0;
+    J.block<4, 1>(2, 4) << c, s, 0.0, 0.0;
+    J.block<4, 1>(2, 5) << 0.0, 0.0, -s, c;
+    J.block<4, 1>(2, 6) << -x(4) * s, x(4) * c, -x(5) * c, -x(5) * s;
+    return J;
+  }
+};
+
+/// A frame as a measurement of filter/: one number a sample, white noise. A sample outside the map predicts
+/// NaN, which those filters refuse (Status::not_finite) without touching the belief; PatchFilter drops such
+/// samples instead. Their update costs O(q^3) for q samples: for small frames and for comparison.
+template <FramePlacement Placement, FieldInterpolant Map>
+struct PatchSensor {
+  using State = typename Placement::State;
+  using Measurement = Vector<dynamic>;
+  Placement where;
+  const Map* map;
+  PatchShape shape;
+  double variance;  ///< of each sample's noise
+
+  [[nodiscard]] Measurement predict(const State& x) const {
+    PatchSamples f;
+    sample_patch(*map, shape, where.placement(x), f);
+    Measurement z(static_cast<Eigen::Index>(shape.size()));
+    for (std::size_t i = 0; i < shape.size(); ++i)
+      z(static_cast<Eigen::Index>(i)) =
+          f.inside[i] != 0 ? f.value[i] : std::numeric_limits<double>::quiet_NaN();
+    return z;
+  }
+  [[nodiscard]] Matrix<dynamic, State::RowsAtCompileTime> jacobian(const State& x) const {
+    PatchSamples f;
+    sample_patch(*map, shape, where.placement(x), f);
+    Matrix<dynamic, 6> w(static_cast<Eigen::Index>(shape.size()), 6);
+    for (std::size_t i = 0; i < shape.size(); ++i) {
+      const double a = shape.a(i), b = shape.b(i), fx = f.dx[i], fy = f.dy[i];
+      w.row(static_cast<Eigen::Index>(i)) << fx, fy, a * fx, a * fy, b * fx, b * fy;
+    }
+    return w * where.jacobian(x);
+  }
+  [[nodiscard]] Matrix<dynamic> noise(const State&) const {
+    const auto q = static_cast<Eigen::Index>(shape.size());
+    return variance * Matrix<dynamic>::Identity(q, q);
+  }
+};
+
+}  // namespace cairn::inline CAIRN_ABI

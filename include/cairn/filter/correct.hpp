@@ -1,0 +1,241 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The measurement update that the Kalman, extended and iterated filters share, given H, R and the residual.
+///
+/// With r = z - h(x), S = H P H^T + R and K = P H^T S^-1:
+///   standard    P - W W^T,  W = P H^T S^-1/2            symmetric; the fastest
+///   joseph      (I - K H) P (I - K H)^T + K R K^T       a sum of squares; keeps more digits when R is tiny
+///   sequential  one number of the measurement after the other (R is decorrelated first)
+/// (Bar-Shalom, Li, Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001, 5.2.3 and
+/// 7.3; Grewal, Andrews, "Kalman Filtering", chapter 6.) Where cancellation is worse than these can bear use
+/// square_root.hpp or ud.hpp; here it ends in Status::not_positive_definite, not in a wrong covariance. A
+/// measurement without noise (R = 0) leaves no digits of P - W W^T: take joseph.
+#pragma once
+
+#include <algorithm>
+#include <limits>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/kernels.hpp>
+#include <cairn/filter/status.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// How the covariance is lowered by a measurement.
+enum class Form { standard, joseph, sequential };
+
+namespace detail {
+
+/// Result of an update before anyone decides to keep it.
+template <int N, int M, class S>
+struct Candidate {
+  Innovation<M, S> innovation;
+  Vector<N, S> step;
+  Matrix<N, N, S> covariance;
+};
+
+template <int M, class S>
+[[nodiscard]] Innovation<M, S> fresh_innovation(const Vector<M, S>& residual, const Matrix<M, M, S>& r) {
+  Innovation<M, S> result;
+  result.residual = residual;
+  result.covariance = r;
+  return result;
+}
+
+/// Why an update that went wrong went wrong. Off the hot path.
+template <int M, class S, class P>
+[[nodiscard, gnu::cold, gnu::noinline]] Status diagnose(const Innovation<M, S>& in, const P& prior,
+                                                        double gate) {
+  if (!(gate > 0.0)) return Status::bad_option;
+  if (!all_finite(in.residual) || !all_finite(in.covariance) || !all_finite(prior)) return Status::not_finite;
+  if (!finite(log_determinant<M, S>(in.covariance))) return Status::not_positive_definite;
+  if (in.nis > static_cast<S>(gate)) return Status::gated;
+  return finite(in.nis) ? Status::not_positive_definite : Status::not_finite;
+}
+
+template <int N, int M, class S, class H>
+[[nodiscard, gnu::noinline]] Matrix<N, N, S> joseph(const Matrix<N, N, S>& p, const H& h,
+                                                    const Matrix<M, M, S>& r, const Correction<N, M, S>& c) {
+  Column<N, S> gain[M];  // K = W D^-1/2 L^-1, last column first
+  for (int j = M - 1; j >= 0; --j) {
+    gain[j] = c.w[j];
+    gain[j].scale(c.inverse_root[j]);
+    for (int i = j + 1; i < M; ++i) gain[j].subtract(gain[i], c.lower[i][j]);
+  }
+  Matrix<N, M, S> k;
+  for (int j = 0; j < M; ++j) gain[j].store(k.data() + j * N);
+  Matrix<N, N, S> a = -(k * dense_of(h)).eval();
+  for (int i = 0; i < N; ++i) a(i, i) += S(1);
+  return congruence(a, p, congruence(k, r, Matrix<N, N, S>::Zero().eval()));
+}
+
+/// One number at a time: z_j = h_j x + noise of variance d_j, after L^-1 with R = L diag(d) L^T.
+template <int N, int M, class S, class H>
+[[nodiscard, gnu::noinline]] bool sequential(const H& h, const Matrix<M, M, S>& r,
+                                             const Vector<M, S>& residual, Matrix<N, N, S>& p,
+                                             Vector<N, S>& step, S& nis) {
+  using std::sqrt;
+  S lower[M][M];
+  S inverse_root[M];
+  if (!factor(r, lower, inverse_root)) return false;
+  Matrix<M, N, S> rows = dense_of(h);
+  Vector<M, S> left = residual;
+  step.setZero();
+  nis = S(0);
+  for (int j = 0; j < M; ++j) {
+    for (int k = 0; k < j; ++k) {
+      rows.row(j) -= lower[j][k] * rows.row(k);
+      left(j) -= lower[j][k] * left(k);
+    }
+    const Vector<N, S> ph = p * rows.row(j).transpose();
+    const S variance = rows.row(j).dot(ph) + S(1) / (inverse_root[j] * inverse_root[j]);
+    if (!(variance > S(0))) return false;
+    const S error = left(j) - rows.row(j).dot(step);
+    const Vector<N, S> w = ph / sqrt(variance);
+    p -= w * w.transpose();
+    step += ph * (error / variance);
+    nis += error * error / variance;
+  }
+  return true;
+}
+
+/// P - W W^T has digits left: no variance has shrunk to the rounding error of the one it was taken from.
+template <int N, class S>
+[[nodiscard]] inline bool keeps_digits(const Matrix<N, N, S>& updated, const Matrix<N, N, S>& prior) {
+  constexpr S least = S(4) * std::numeric_limits<S>::epsilon();
+  bool good = true;
+  for (int i = 0; i < static_cast<int>(prior.rows()); ++i)
+    good = good && updated(i, i) >= least * prior(i, i);
+  return good;
+}
+
+/// The update for sizes known at compile time.
+template <int N, int M, class S, class H>
+  requires(N != dynamic && M != dynamic)
+inline void correct_into(Candidate<N, M, S>& out, const Matrix<N, N, S>& prior, const H& h,
+                         const Matrix<M, M, S>& r, double gate, Form form) {
+  Innovation<M, S>& in = out.innovation;
+  Column<N, S> p[N];
+  for (int j = 0; j < N; ++j) p[j].load(prior.data() + j * N);
+  Correction<N, M, S> c;
+  bool good = correction(p, h, r, in.covariance, c);
+  S y[M];
+  c.whiten(in.residual.data(), y);
+  in.nis = S(0);
+  Column<N, S> step;
+  step.set_zero();
+  for (int m = 0; m < M; ++m) {
+    in.nis += y[m] * y[m];
+    step.add(c.w[m], y[m]);
+  }
+  good = good && in.nis <= static_cast<S>(gate) && in.nis <= std::numeric_limits<S>::max();
+  if (good && form == Form::standard) [[likely]] {
+    step.store(out.step.data());
+    lower_by_squares(p, c.w);
+    for (int j = 0; j < N; ++j) p[j].store(out.covariance.data() + j * N);
+  } else if (good && form == Form::joseph) {
+    step.store(out.step.data());
+    out.covariance = joseph<N, M, S>(prior, h, r, c);
+  } else if (good) {
+    out.covariance = prior;
+    good = sequential<N, M, S>(h, r, in.residual, out.covariance, out.step, in.nis);
+  }
+  good = good && gate > 0.0 && (form == Form::joseph || keeps_digits<N, S>(out.covariance, prior)) &&
+         is_covariance<N, S>(out.covariance);
+  if (!good) [[unlikely]]
+    in.status = diagnose<M, S>(in, prior, gate);
+}
+
+/// The update for sizes known at run time; sequential is standard there.
+template <int N, int M, class S>
+  requires(N == dynamic || M == dynamic)
+void correct_into(Candidate<N, M, S>& out, const Matrix<N, N, S>& prior, const Matrix<M, N, S>& h,
+                  const Matrix<M, M, S>& r, double gate, Form form) {
+  Innovation<M, S>& in = out.innovation;
+  if (h.cols() != prior.rows() || h.rows() != in.residual.size() || r.rows() != h.rows() ||
+      r.cols() != h.rows()) {
+    in.status = Status::size_mismatch;
+    return;
+  }
+  const Matrix<N, M, S> ph = prior * h.transpose();
+  in.covariance = symmetrised(h * ph + r);
+  const Eigen::LLT<Matrix<M, M, S>> root(in.covariance);
+  const Matrix<M, N, S> w = root.matrixL().solve(ph.transpose());  // S^-1/2 H P
+  const Vector<M, S> y = root.matrixL().solve(in.residual);
+  in.nis = y.squaredNorm();
+  bool good = root.info() == Eigen::Success && in.nis <= static_cast<S>(gate) && gate > 0.0 &&
+              in.nis <= std::numeric_limits<S>::max();
+  if (good) {
+    out.step = w.transpose() * y;
+    if (form == Form::joseph) {
+      const Matrix<M, N, S> gain_t = root.matrixU().solve(w);
+      Matrix<N, N, S> a = -gain_t.transpose() * h;
+      a.diagonal().array() += S(1);
+      out.covariance = symmetrised(a * prior * a.transpose() + gain_t.transpose() * r * gain_t);
+    } else {
+      out.covariance = symmetrised(prior - w.transpose() * w);
+    }
+    good = (form == Form::joseph || keeps_digits<N, S>(out.covariance, prior)) &&
+           is_valid_covariance<N, S>(out.covariance);
+  }
+  if (!good) in.status = diagnose<M, S>(in, prior, gate);
+}
+
+/// Runs the update and keeps it in the belief if everything about it is sound.
+template <Manifold X, int M, class H>
+inline Innovation<M, ScalarOf<X>> correct(Gaussian<X>& belief, const H& h, const Matrix<M, M, ScalarOf<X>>& r,
+                                          const Vector<M, ScalarOf<X>>& residual, double gate, Form form) {
+  using S = ScalarOf<X>;
+  constexpr int n = dof<X>;
+  Candidate<n, M, S> candidate{fresh_innovation<M, S>(residual, r), {}, {}};
+  if constexpr (n == dynamic || M == dynamic)
+    correct_into<n, M, S>(candidate, belief.covariance, dense_of(h), r, gate, form);
+  else
+    correct_into<n, M, S>(candidate, belief.covariance, h, r, gate, form);
+  if (candidate.innovation.status == Status::accepted && !finite_state(belief.mean)) [[unlikely]]
+    candidate.innovation.status = Status::not_finite;
+  if (candidate.innovation.status == Status::accepted) [[likely]] {
+    belief.mean = manifold_traits<X>::retract(belief.mean, candidate.step);
+    belief.covariance = candidate.covariance;
+  }
+  return candidate.innovation;
+}
+
+/// The covariance part of a prediction: fading * F P F^T + Q + extra I, kept with the mean if both are sound.
+template <Manifold X, class F>
+inline Status advance(Gaussian<X>& belief, const X& mean, const F& f, const CovarianceOf<X>& q, double fading,
+                      double extra) {
+  using S = ScalarOf<X>;
+  constexpr int n = dof<X>;
+  CovarianceOf<X> next;
+  if constexpr (n == dynamic) {
+    if (f.rows() != belief.covariance.rows() || f.cols() != f.rows() || q.rows() != f.rows() ||
+        q.cols() != f.rows())
+      return Status::size_mismatch;
+    next = static_cast<S>(fading) * f * belief.covariance * f.transpose();
+    next = symmetrised(next + q);
+  } else if (fading == 1.0) [[likely]] {
+    next = congruence(f, belief.covariance, q);
+  } else {
+    next = congruence(f, belief.covariance, Matrix<n, n, S>::Zero().eval()) * static_cast<S>(fading) + q;
+    mirror_lower<n, S>(next);
+  }
+  if (extra > 0.0) [[unlikely]]
+    for (int i = 0; i < static_cast<int>(next.rows()); ++i) next(i, i) += static_cast<S>(extra);
+  bool positive = true;
+  for (int i = 0; i < static_cast<int>(next.rows()); ++i) positive = positive && next(i, i) >= S(0);
+  if (!all_finite(next) || !finite_state(mean)) [[unlikely]]
+    return Status::not_finite;
+  if (!positive) [[unlikely]]
+    return Status::not_positive_definite;
+  belief.mean = mean;
+  belief.covariance = next;
+  return Status::accepted;
+}
+
+}  // namespace detail
+}  // namespace cairn::inline CAIRN_ABI

@@ -1,0 +1,145 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The extended Kalman filter on manifolds, and its iterated update.
+///
+///   predict   x <- f(x, u),   P <- F P F^T + Q,   F the Jacobian at the old x
+///   update    x <- x (+) K (z (-) h(x)),   P <- P - K S K^T,   H the Jacobian at x
+/// With iterations > 1 the update relinearises: e_{k+1} = K_k (z (-) h(x_k) + H_k e_k), x_k = x (+) e_k,
+/// which is Gauss-Newton on the posterior density (B. Bell, F. Cathey, "The iterated Kalman filter update as
+/// a Gauss-Newton method", IEEE Trans. Automatic Control 38, 1993); a step that does not lower the cost is
+/// halved. The error lives in the tangent space at the mean (an error-state filter).
+#pragma once
+
+#include <concepts>
+#include <limits>
+
+#include <cairn/filter/correct.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/model.hpp>
+#include <cairn/filter/status.hpp>
+#include <cairn/manifold/jacobian.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// Extended Kalman filter. Options only: may serve any number of beliefs and threads.
+struct Extended {
+  Form form = Form::standard;
+  double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
+  double fading = 1.0;             ///< fading memory: F P F^T is multiplied by this each step; >= 1
+  double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
+  int iterations = 1;              ///< of the update; 1 is the plain filter
+  double tolerance = 1e-10;        ///< iterations end when the step changes by less, in standard deviations
+
+  /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite.
+  template <LinearisedProcess F>
+  Status predict(Gaussian<typename F::State>& belief, const F& process, const typename F::Control& control,
+                 double dt) const {
+    if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
+    if (!(fading >= 1.0) || !(stabilising_noise >= 0.0)) return Status::bad_option;
+    return detail::advance(belief, process.propagate(belief.mean, control, dt),
+                           process.jacobian(belief.mean, control, dt),
+                           process.noise(belief.mean, control, dt), fading, stabilising_noise);
+  }
+  template <LinearisedProcess F>
+    requires std::same_as<typename F::Control, NoControl>
+  Status predict(Gaussian<typename F::State>& belief, const F& process, double dt) const {
+    return predict(belief, process, NoControl{}, dt);
+  }
+
+  /// Takes in the measurement z, or refuses it and leaves the belief as it was. The innovation is the one
+  /// before the update, whatever the iterations.
+  template <LinearisedMeasurement H>
+  Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
+      Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
+    using X = typename H::State;
+    constexpr int m = dof<typename H::Measurement>;
+    const auto residual = local(typename H::Measurement(sensor.predict(belief.mean)), z);
+    if (iterations == 1) [[likely]]
+      return detail::correct<X, m>(belief, sensor.jacobian(belief.mean), sensor.noise(belief.mean), residual,
+                                   gate, form);
+    Gaussian<X> first = belief;
+    auto innovation = detail::correct<X, m>(first, sensor.jacobian(belief.mean), sensor.noise(belief.mean),
+                                            residual, gate, form);
+    if (iterations < 1) innovation.status = Status::bad_option;
+    if (innovation.accepted()) innovation.status = iterate(belief, sensor, z);
+    return innovation;
+  }
+
+private:
+  template <class H>
+  Status iterate(Gaussian<typename H::State>& belief, const H& sensor,
+                 const typename H::Measurement& z) const;
+};
+
+namespace detail {
+
+/// Twice the negative logarithm of the posterior at prior (+) e, without constants.
+template <class H, Manifold X>
+[[nodiscard]] ScalarOf<X> posterior_cost(const Gaussian<X>& prior, const Tangent<X>& e, const H& sensor,
+                                         const typename H::Measurement& z) {
+  using S = ScalarOf<X>;
+  constexpr int m = dof<typename H::Measurement>;
+  const X x = retract(prior.mean, e);
+  const Vector<m, S> residual = local(typename H::Measurement(sensor.predict(x)), z);
+  const Matrix<m, m, S> r = sensor.noise(x);
+  return squared_mahalanobis<dof<X>, S>(e, prior.covariance) + squared_mahalanobis<m, S>(residual, r);
+}
+
+/// Derivative at d = e of the step seen from x = prior (+) e: how tangent vectors move from the prior's mean
+/// to x. The identity for vectors.
+template <Manifold X>
+[[nodiscard]] CovarianceOf<X> transport(const X& prior, const Tangent<X>& e) {
+  if constexpr (is_vector<X>)
+    return CovarianceOf<X>::Identity(e.size(), e.size());
+  else
+    return numeric_jacobian([&](const Tangent<X>& d) -> X { return retract(prior, d); }, e);
+}
+
+}  // namespace detail
+
+template <class H>
+Status Extended::iterate(Gaussian<typename H::State>& belief, const H& sensor,
+                         const typename H::Measurement& z) const {
+  using X = typename H::State;
+  using S = ScalarOf<X>;
+  constexpr int n = dof<X>;
+  constexpr int m = dof<typename H::Measurement>;
+  constexpr double no_gate = std::numeric_limits<double>::infinity();
+  Tangent<X> e = local(belief.mean, belief.mean);
+  S cost = detail::posterior_cost(belief, e, sensor, z);
+  CovarianceOf<X> covariance = belief.covariance;
+  CovarianceOf<X> transport = detail::transport(belief.mean, e);
+  for (int k = 0; k < iterations; ++k) {
+    const X x = retract(belief.mean, e);
+    transport = detail::transport(belief.mean, e);
+    const Matrix<m, n, S> h = detail::dense_of(sensor.jacobian(x)) * transport;
+    Vector<m, S> residual = local(typename H::Measurement(sensor.predict(x)), z);
+    residual += h * e;
+    const Matrix<m, m, S> noise = sensor.noise(x);
+    detail::Candidate<n, m, S> next{detail::fresh_innovation<m, S>(residual, noise), e, covariance};
+    detail::correct_into<n, m, S>(next, belief.covariance, h, noise, no_gate, form);
+    if (next.innovation.status != Status::accepted) return next.innovation.status;
+    covariance = next.covariance;
+    Tangent<X> change = next.step - e;
+    S lower = detail::posterior_cost(belief, Tangent<X>(e + change), sensor, z);
+    for (int halving = 0; halving < 10 && !(lower <= cost); ++halving) {
+      change *= S(0.5);
+      lower = detail::posterior_cost(belief, Tangent<X>(e + change), sensor, z);
+    }
+    if (!(lower <= cost)) break;  // no descent left above rounding
+    e += change;
+    cost = lower;
+    const S size = detail::squared_mahalanobis<n, S>(change, belief.covariance);
+    if (size <= static_cast<S>(tolerance * tolerance)) break;
+  }
+  if (!detail::all_finite(e) || !detail::finite_state(belief.mean)) return Status::not_finite;
+  transport = detail::transport(belief.mean, e);
+  belief.mean = retract(belief.mean, e);
+  belief.covariance = symmetrised(transport * covariance * transport.transpose());
+  return Status::accepted;
+}
+
+}  // namespace cairn::inline CAIRN_ABI

@@ -1,0 +1,176 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The information filter: the belief as Y = P^-1 and y = Y d, about a point x of linearisation.
+///
+///   update    Y <- Y + H^T R^-1 H,   y <- y + H^T R^-1 (z (-) h(x))          a sum: sensors in any order
+///   predict   M = F^-T Y F^-1,   Y <- M - M G (I + G^T M G)^-1 G^T M,   Q = G G^T
+/// (Maybeck, "Stochastic Models, Estimation, and Control", vol. 1, 5.7.) Y may be singular: a state nobody
+/// has seen has zero information, and no prior is needed. Many numbers of one measurement cost one small sum
+/// each. Loses digits where H^T R^-1 H swamps Y where the square-root form keeps them.
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <limits>
+#include <optional>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/model.hpp>
+#include <cairn/filter/status.hpp>
+#include <cairn/filter/structure.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// Truth = retract(point, d); the density of d is exp(-(d^T Y d) / 2 + y^T d). Y may be singular.
+template <Manifold X>
+struct InformationBelief {
+  X point;
+  CovarianceOf<X> information;
+  Tangent<X> vector;
+
+  /// Nothing known, linearised at `x`.
+  [[nodiscard]] static InformationBelief ignorant(const X& x) {
+    const int n = dof_of(x);
+    return {x, CovarianceOf<X>::Zero(n, n), Tangent<X>::Zero(n)};
+  }
+  /// The same belief in information form; nothing where the covariance is singular.
+  [[nodiscard]] static std::optional<InformationBelief> from(const Gaussian<X>& belief) {
+    const int n = dof_of(belief.mean);
+    const Eigen::LLT<CovarianceOf<X>> root(belief.covariance);
+    if (root.info() != Eigen::Success) return std::nullopt;
+    return InformationBelief{belief.mean, symmetrised(root.solve(CovarianceOf<X>::Identity(n, n))),
+                             Tangent<X>::Zero(n)};
+  }
+  /// Mean and covariance; nothing while some direction has no information.
+  [[nodiscard]] std::optional<Gaussian<X>> gaussian() const {
+    const Eigen::LLT<CovarianceOf<X>> root(information);
+    if (root.info() != Eigen::Success) return std::nullopt;
+    const Tangent<X> d = root.solve(vector);
+    const int n = static_cast<int>(vector.size());
+    Gaussian<X> result{retract(point, d), symmetrised(root.solve(CovarianceOf<X>::Identity(n, n)))};
+    if (!detail::all_finite(result.covariance) || !detail::finite_state(result.mean)) return std::nullopt;
+    return result;
+  }
+};
+
+namespace detail {
+
+/// Solves a x = b for square a by elimination with row pivots; false where a is singular.
+template <int N, int C, class S>
+[[nodiscard]] bool solve_square(Matrix<N, N, S> a, Matrix<N, C, S>& b) {
+  using std::abs;
+  const int n = static_cast<int>(a.rows());
+  for (int j = 0; j < n; ++j) {
+    int best = j;
+    for (int i = j + 1; i < n; ++i)
+      if (abs(a(i, j)) > abs(a(best, j))) best = i;
+    if (!(abs(a(best, j)) > S(0))) return false;
+    if (best != j) {
+      a.row(j).swap(a.row(best));
+      b.row(j).swap(b.row(best));
+    }
+    for (int i = j + 1; i < n; ++i) {
+      const S factor = a(i, j) / a(j, j);
+      a.row(i) -= factor * a.row(j);
+      b.row(i) -= factor * b.row(j);
+    }
+  }
+  for (int j = n - 1; j >= 0; --j) {
+    for (int k = j + 1; k < n; ++k) b.row(j) -= a(j, k) * b.row(k);
+    b.row(j) /= a(j, j);
+  }
+  return true;
+}
+
+}  // namespace detail
+
+/// Information filter for linear and linearised models. Options only.
+struct InformationFilter {
+  /// Moves the belief by one step of dt. The mean of what is known is moved by the process first, so the
+  /// point of linearisation follows the estimate. Refused: a singular F.
+  template <LinearisedProcess F>
+  Status predict(InformationBelief<typename F::State>& belief, const F& process,
+                 const typename F::Control& control, double dt) const {
+    using X = typename F::State;
+    using S = ScalarOf<X>;
+    constexpr int n = dof<X>;
+    if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
+    InformationBelief<X> next = belief;
+    recentre(next);
+    const int size = static_cast<int>(next.vector.size());
+    const CovarianceOf<X> f = detail::dense_of(process.jacobian(next.point, control, dt));
+    const CovarianceOf<X> q = process.noise(next.point, control, dt);
+    const CovarianceOf<X> g = detail::semi_definite_root<n, S>(q);
+    CovarianceOf<X> inverse = CovarianceOf<X>::Identity(size, size);
+    if (f.rows() != size || q.rows() != size) return Status::size_mismatch;
+    if (!detail::all_finite(f) || !detail::all_finite(q)) return Status::not_finite;
+    if (!detail::solve_square<n, n, S>(f, inverse)) return Status::not_positive_definite;
+    const CovarianceOf<X> m = symmetrised(inverse.transpose() * next.information * inverse);
+    const Tangent<X> y = inverse.transpose() * next.vector;
+    const CovarianceOf<X> mg = m * g;
+    const CovarianceOf<X> inner = CovarianceOf<X>::Identity(size, size) + g.transpose() * mg;
+    const Eigen::LLT<CovarianceOf<X>> root(inner);
+    if (root.info() != Eigen::Success) return Status::not_positive_definite;
+    next.information = symmetrised(m - mg * root.solve(mg.transpose()));
+    next.vector = y - mg * root.solve(g.transpose() * y);
+    next.point = process.propagate(next.point, control, dt);
+    return keep(belief, next);
+  }
+  template <LinearisedProcess F>
+    requires std::same_as<typename F::Control, NoControl>
+  Status predict(InformationBelief<typename F::State>& belief, const F& process, double dt) const {
+    return predict(belief, process, NoControl{}, dt);
+  }
+
+  /// Adds the information of the measurement z, linearised at the belief's point. O(M^2 N + M N^2).
+  template <LinearisedMeasurement H>
+  Status update(InformationBelief<typename H::State>& belief, const H& sensor,
+                const typename H::Measurement& z) const {
+    using X = typename H::State;
+    using Z = typename H::Measurement;
+    using S = ScalarOf<X>;
+    constexpr int m = dof<Z>;
+    const Matrix<m, dof<X>, S> h = detail::dense_of(sensor.jacobian(belief.point));
+    const Matrix<m, m, S> r = sensor.noise(belief.point);
+    const Vector<m, S> residual = local(Z(sensor.predict(belief.point)), z);
+    if (h.cols() != belief.vector.size() || h.rows() != residual.size()) return Status::size_mismatch;
+    const Eigen::LLT<Matrix<m, m, S>> root(r);
+    if (root.info() != Eigen::Success || !detail::all_finite(r))
+      return detail::all_finite(r) ? Status::not_positive_definite : Status::not_finite;
+    const Matrix<m, dof<X>, S> white = root.matrixL().solve(h);
+    InformationBelief<X> next = belief;
+    next.information += white.transpose() * white;
+    next.vector += white.transpose() * root.matrixL().solve(residual);
+    return keep(belief, next);
+  }
+
+  /// Moves the point of linearisation to the mean; false, and nothing changed, while that is unknown.
+  template <Manifold X>
+  static bool recentre(InformationBelief<X>& belief) {
+    const Eigen::LLT<CovarianceOf<X>> root(belief.information);
+    if (root.info() != Eigen::Success) return false;
+    const Tangent<X> d = root.solve(belief.vector);
+    if (!detail::all_finite(d)) return false;
+    belief.point = retract(belief.point, d);
+    belief.vector.setZero();
+    return true;
+  }
+
+private:
+  template <Manifold X>
+  static Status keep(InformationBelief<X>& belief, const InformationBelief<X>& next) {
+    if (!detail::all_finite(next.information) || !detail::all_finite(next.vector) ||
+        !detail::finite_state(next.point))
+      return Status::not_finite;
+    if (!detail::is_valid_covariance<dof<X>, ScalarOf<X>>(symmetrised(next.information)))
+      return Status::not_positive_definite;
+    belief = next;
+    return Status::accepted;
+  }
+};
+
+}  // namespace cairn::inline CAIRN_ABI

@@ -1,0 +1,131 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// Interacting multiple models: several processes, one of which is true at a time, and a Markov chain between
+/// them.
+///
+///   mix      x_j, P_j <- the modes' beliefs weighted by mu_ij = p_ij mu_i / c_j,   c_j = sum_i p_ij mu_i
+///   predict  each mode by its own process;   update  each by the sensor, mu_j ~ c_j N(residual_j; 0, S_j)
+/// (H. Blom, Y. Bar-Shalom, "The interacting multiple model algorithm for systems with Markovian switching
+/// coefficients", IEEE Trans. Automatic Control 33, 1988.) Works over any filter of Gaussian beliefs.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <tuple>
+#include <utility>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/core/statistics.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/model.hpp>
+#include <cairn/filter/status.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// R Gaussians and how probable each is (sum 1).
+template <Manifold X, std::size_t R>
+struct ModeBelief {
+  std::array<Gaussian<X>, R> modes;
+  std::array<double, R> probability;
+
+  /// One Gaussian with the mixture's mean (two rounds of tangent averaging) and covariance.
+  [[nodiscard]] Gaussian<X> combined() const { return mixture(modes, probability); }
+
+  /// The moments of a mixture with the given weights.
+  [[nodiscard]] static Gaussian<X> mixture(const std::array<Gaussian<X>, R>& parts,
+                                           const std::array<double, R>& weights) {
+    using S = ScalarOf<X>;
+    std::size_t heaviest = 0;
+    for (std::size_t i = 1; i < R; ++i)
+      if (weights[i] > weights[heaviest]) heaviest = i;
+    X mean = parts[heaviest].mean;
+    for (int round = 0; round < 2; ++round) {
+      Tangent<X> shift = Tangent<X>::Zero(dof_of(mean));
+      for (std::size_t i = 0; i < R; ++i) shift += static_cast<S>(weights[i]) * local(mean, parts[i].mean);
+      mean = retract(mean, shift);
+    }
+    CovarianceOf<X> covariance = CovarianceOf<X>::Zero(dof_of(mean), dof_of(mean));
+    for (std::size_t i = 0; i < R; ++i) {
+      const Tangent<X> d = local(mean, parts[i].mean);
+      covariance += static_cast<S>(weights[i]) * (parts[i].covariance + d * d.transpose());
+    }
+    return {mean, covariance};
+  }
+};
+
+/// The filter over R modes. `switching[i][j]` is the probability that mode i is followed by mode j.
+template <std::size_t R, class Filter>
+struct Interacting {
+  Filter filter{};
+  std::array<std::array<double, R>, R> switching{};
+
+  /// Mixes, then moves every mode by its own process of `processes`. All or none are kept.
+  template <Manifold X, class... F>
+    requires(sizeof...(F) == R)
+  Status predict(ModeBelief<X, R>& belief, const std::tuple<F...>& processes,
+                 const typename std::tuple_element_t<0, std::tuple<F...>>::Control& control,
+                 double dt) const {
+    if (!stochastic()) return Status::bad_option;
+    ModeBelief<X, R> next = belief;
+    for (std::size_t j = 0; j < R; ++j) {
+      std::array<double, R> weights{};
+      double total = 0.0;
+      for (std::size_t i = 0; i < R; ++i) total += weights[i] = switching[i][j] * belief.probability[i];
+      next.probability[j] = total;
+      if (!(total > 0.0)) continue;  // a mode that cannot be: its belief no longer matters
+      for (double& w : weights) w /= total;
+      next.modes[j] = ModeBelief<X, R>::mixture(belief.modes, weights);
+    }
+    Status status = Status::accepted;
+    [&]<std::size_t... J>(std::index_sequence<J...>) {
+      ((status = status != Status::accepted
+                     ? status
+                     : filter.predict(next.modes[J], std::get<J>(processes), control, dt)),
+       ...);
+    }(std::make_index_sequence<R>{});
+    if (status == Status::accepted) belief = next;
+    return status;
+  }
+
+  /// Every mode takes in z; a mode that refuses keeps its belief and loses its weight. Refused by all: the
+  /// first mode's reason, and the belief as it was.
+  template <MeasurementModel H>
+  Status update(ModeBelief<typename H::State, R>& belief, const H& sensor,
+                const typename H::Measurement& z) const {
+    ModeBelief<typename H::State, R> next = belief;
+    std::array<double, R> weight{};
+    Status first_refusal = Status::accepted;
+    for (std::size_t j = 0; j < R; ++j) {
+      const auto innovation = filter.update(next.modes[j], sensor, z);
+      if (!innovation.accepted() && first_refusal == Status::accepted) first_refusal = innovation.status;
+      weight[j] = innovation.accepted() && belief.probability[j] > 0.0
+                      ? std::log(belief.probability[j]) + static_cast<double>(innovation.log_likelihood())
+                      : -std::numeric_limits<double>::infinity();
+    }
+    const double total = log_sum_exp(weight);
+    if (!std::isfinite(total)) return first_refusal != Status::accepted ? first_refusal : Status::depleted;
+    for (std::size_t j = 0; j < R; ++j) next.probability[j] = std::exp(weight[j] - total);
+    belief = next;
+    return Status::accepted;
+  }
+
+private:
+  [[nodiscard]] bool stochastic() const noexcept {
+    for (const auto& row : switching) {
+      double sum = 0.0;
+      for (const double p : row) {
+        if (!(p >= 0.0)) return false;
+        sum += p;
+      }
+      if (!(std::abs(sum - 1.0) < 1e-9)) return false;
+    }
+    return true;
+  }
+};
+
+}  // namespace cairn::inline CAIRN_ABI

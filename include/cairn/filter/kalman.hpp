@@ -1,0 +1,61 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The Kalman filter: exact for linear models with Gaussian noise.
+///
+///   predict   x <- F x + b,   P <- F P F^T + Q
+///   update    x <- x + K (z - H x),   P <- P - K S K^T,   K = P H^T S^-1,   S = H P H^T + R
+/// (R. E. Kalman, "A New Approach to Linear Filtering and Prediction Problems", 1960.)
+///
+/// The filter is a struct of options and holds no state: one Kalman may serve any number of beliefs, from any
+/// number of threads. Fixed sizes never allocate.
+#pragma once
+
+#include <concepts>
+#include <limits>
+
+#include <cairn/filter/correct.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/model.hpp>
+#include <cairn/filter/status.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// Kalman filter for linear models.
+struct Kalman {
+  Form form = Form::standard;
+  double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
+  double fading = 1.0;             ///< fading memory: F P F^T is multiplied by this each step; >= 1
+  double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
+
+  /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite.
+  template <LinearProcess F>
+  Status predict(Gaussian<typename F::State>& belief, const F& process, const typename F::Control& control,
+                 double dt) const {
+    if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
+    if (!(fading >= 1.0) || !(stabilising_noise >= 0.0)) return Status::bad_option;
+    return detail::advance(belief, process.propagate(belief.mean, control, dt),
+                           process.jacobian(belief.mean, control, dt),
+                           process.noise(belief.mean, control, dt), fading, stabilising_noise);
+  }
+
+  /// The same for a process without control.
+  template <LinearProcess F>
+    requires std::same_as<typename F::Control, NoControl>
+  Status predict(Gaussian<typename F::State>& belief, const F& process, double dt) const {
+    return predict(belief, process, NoControl{}, dt);
+  }
+
+  /// Takes in the measurement z, or refuses it and leaves the belief as it was.
+  template <LinearMeasurement H>
+  Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
+      Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
+    return detail::correct<typename H::State, dof<typename H::Measurement>>(
+        belief, sensor.jacobian(belief.mean), sensor.noise(belief.mean),
+        local(typename H::Measurement(sensor.predict(belief.mean)), z), gate, form);
+  }
+};
+
+}  // namespace cairn::inline CAIRN_ABI

@@ -1,0 +1,156 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The Kalman-Bucy filter: continuous time between measurements, or continuous measurements too.
+///
+/// The process is a rate, x' = f(x, u) + white noise of spectral density Q, A = df/dx; a continuous sensor
+/// has noise of spectral density R:
+///   x' = f(x, u) + K (z - h(x)),   P' = A P + P A^T + Q - K R K^T,   K = P H^T R^-1        (covariance)
+///   Y' = -Y A - A^T Y - Y Q Y + H^T R^-1 H                                                 (information)
+/// (R. E. Kalman, R. S. Bucy, "New results in linear filtering and prediction theory", 1961), integrated by
+/// the classical Runge-Kutta rule in `steps` equal parts. Measurements at instants go through Kalman,
+/// Extended or InformationFilter: together that is the continuous-discrete filter.
+///
+///   struct Drifting {
+///     using State = Vector<2>;  using Control = NoControl;
+///     Tangent<State> rate(const State& x, const Control& u) const;        // per second
+///     Matrix<2> rate_jacobian(const State& x, const Control& u) const;    // A
+///     Matrix<2> spectral_density(const State& x, const Control& u) const; // Q, per second
+///   };
+#pragma once
+
+#include <concepts>
+#include <limits>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/information.hpp>
+#include <cairn/filter/model.hpp>
+#include <cairn/filter/status.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// A process in continuous time.
+template <class F>
+concept ContinuousProcess = Manifold<typename F::State> &&
+                            requires(const F& f, const typename F::State& x, const typename F::Control& u) {
+                              { f.rate(x, u) } -> std::convertible_to<Tangent<typename F::State>>;
+                              {
+                                f.rate_jacobian(x, u)
+                              } -> std::convertible_to<CovarianceOf<typename F::State>>;
+                              {
+                                f.spectral_density(x, u)
+                              } -> std::convertible_to<CovarianceOf<typename F::State>>;
+                            };
+
+/// Kalman-Bucy filter. Options only. For states that are not vectors the rate is taken in the tangent space
+/// at the start of each part.
+struct KalmanBucy {
+  int steps = 1;  ///< Runge-Kutta parts of one call; >= 1
+
+  /// Moves the belief by dt without measurement.
+  template <ContinuousProcess F>
+  Status predict(Gaussian<typename F::State>& belief, const F& process, const typename F::Control& control,
+                 double dt) const {
+    using X = typename F::State;
+    using P = CovarianceOf<X>;
+    const auto rate = [&](const X& x, const P& p) {
+      const P a = process.rate_jacobian(x, control);
+      const P ap = a * p;
+      return Rates<X>{process.rate(x, control),
+                      P(ap + ap.transpose() + process.spectral_density(x, control))};
+    };
+    return integrate(belief.mean, belief.covariance, rate, dt);
+  }
+
+  /// Moves the belief by dt while the sensor reports z, held constant; sensor.noise() is a spectral density.
+  template <ContinuousProcess F, LinearisedMeasurement H>
+  Status filter(Gaussian<typename F::State>& belief, const F& process, const typename F::Control& control,
+                const H& sensor, const typename H::Measurement& z, double dt) const {
+    using X = typename F::State;
+    using P = CovarianceOf<X>;
+    const auto rate = [&](const X& x, const P& p) {
+      const auto seen = look(sensor, x, z);
+      const P a = process.rate_jacobian(x, control);
+      const P ap = a * p;
+      const Tangent<X> pull = p * seen.state;
+      return Rates<X>{process.rate(x, control) + pull,
+                      P(ap + ap.transpose() + process.spectral_density(x, control) - p * seen.matrix * p)};
+    };
+    return integrate(belief.mean, belief.covariance, rate, dt);
+  }
+
+  /// The same in information form: point and Y move together, y is zero throughout. Y must be positive
+  /// definite for the estimate to move.
+  template <ContinuousProcess F, LinearisedMeasurement H>
+  Status filter(InformationBelief<typename F::State>& belief, const F& process,
+                const typename F::Control& control, const H& sensor, const typename H::Measurement& z,
+                double dt) const {
+    using X = typename F::State;
+    using P = CovarianceOf<X>;
+    InformationBelief<X> next = belief;
+    if (!InformationFilter::recentre(next)) return Status::not_positive_definite;
+    const auto rate = [&](const X& x, const P& y) {
+      const auto seen = look(sensor, x, z);
+      const P a = process.rate_jacobian(x, control);
+      const P ya = y * a;
+      const Tangent<X> pull = Eigen::LLT<P>(y).solve(seen.state);
+      return Rates<X>{process.rate(x, control) + pull,
+                      P(seen.matrix - ya - ya.transpose() - y * process.spectral_density(x, control) * y)};
+    };
+    const Status status = integrate(next.point, next.information, rate, dt);
+    if (status == Status::accepted) belief = next;
+    return status;
+  }
+
+private:
+  template <Manifold X>
+  struct Rates {
+    Tangent<X> state;
+    CovarianceOf<X> matrix;
+  };
+
+  /// What the sensor says at x: H^T R^-1 H and H^T R^-1 (z - h(x)); NaN where R is not positive definite.
+  template <class H, Manifold X>
+  static Rates<X> look(const H& sensor, const X& x, const typename H::Measurement& z) {
+    using S = ScalarOf<X>;
+    using Z = typename H::Measurement;
+    constexpr int m = dof<Z>;
+    const Matrix<m, dof<X>, S> h = detail::dense_of(sensor.jacobian(x));
+    const Matrix<m, m, S> r = sensor.noise(x);
+    const Vector<m, S> residual = local(Z(sensor.predict(x)), z);
+    const Eigen::LLT<Matrix<m, m, S>> root(r);
+    const S sound = root.info() == Eigen::Success ? S(1) : std::numeric_limits<S>::quiet_NaN();
+    return {sound * (h.transpose() * root.solve(residual)), sound * (h.transpose() * root.solve(h))};
+  }
+
+  template <Manifold X, class Rate>
+  Status integrate(X& state, CovarianceOf<X>& matrix, const Rate& rate, double dt) const {
+    using S = ScalarOf<X>;
+    if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
+    if (steps < 1) return Status::bad_option;
+    const S h = static_cast<S>(dt / steps);
+    X x = state;
+    CovarianceOf<X> p = matrix;
+    const auto at = [&](const Rates<X>& k, S by) {
+      return rate(retract(x, Tangent<X>(by * k.state)), CovarianceOf<X>(p + by * k.matrix));
+    };
+    for (int part = 0; part < steps; ++part) {
+      const Rates<X> k1 = rate(x, p);
+      const Rates<X> k2 = at(k1, h / S(2));
+      const Rates<X> k3 = at(k2, h / S(2));
+      const Rates<X> k4 = at(k3, h);
+      x = retract(x, Tangent<X>(h / S(6) * (k1.state + S(2) * (k2.state + k3.state) + k4.state)));
+      p = symmetrised(p + h / S(6) * (k1.matrix + S(2) * (k2.matrix + k3.matrix) + k4.matrix));
+    }
+    if (!detail::all_finite(p) || !detail::finite_state(x)) return Status::not_finite;
+    if (!detail::is_valid_covariance<dof<X>, S>(p)) return Status::not_positive_definite;
+    state = x;
+    matrix = p;
+    return Status::accepted;
+  }
+};
+
+}  // namespace cairn::inline CAIRN_ABI

@@ -1,0 +1,122 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// Jacobians for models that do not give them, chosen by word: numeric(model), automatic(model).
+///
+///   extended.update(belief, automatic(camera), z);
+///
+/// numeric() differentiates propagate and predict by central differences: 2 dof + 1 calls a Jacobian.
+/// automatic() sends dual numbers through them: one call, exact, for models whose propagate and predict are
+/// templates over the scalar,
+///   template <class T> Vector<2, T> propagate(const Vector<2, T>& x, const Control& u, double dt) const;
+/// compare_jacobians() holds a model's own Jacobian against both.
+#pragma once
+
+#include <concepts>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/filter/model.hpp>
+#include <cairn/filter/structure.hpp>
+#include <cairn/manifold/jacobian.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// The model with Jacobians by central differences.
+template <class Model>
+struct Numeric : Model {
+  using State = typename Model::State;
+
+  template <class Control>
+    requires ProcessModel<Model>
+  [[nodiscard]] CovarianceOf<State> jacobian(const State& x, const Control& u, double dt) const {
+    const Model& model = *this;
+    return numeric_jacobian([&](const State& s) -> State { return model.propagate(s, u, dt); }, x);
+  }
+  [[nodiscard]] auto jacobian(const State& x) const
+    requires MeasurementModel<Model>
+  {
+    using Z = typename Model::Measurement;
+    const Model& model = *this;
+    return numeric_jacobian([&](const State& s) -> Z { return model.predict(s); }, x);
+  }
+};
+
+namespace detail {
+
+// An Eigen expression becomes the matrix it stands for.
+template <class Y>
+[[nodiscard]] auto plain(const Y& y) {
+  if constexpr (requires { y.eval(); })
+    return y.eval();
+  else
+    return y;
+}
+
+}  // namespace detail
+
+/// The model with Jacobians by dual numbers.
+template <class Model>
+struct Automatic : Model {
+  using State = typename Model::State;
+
+  template <class Control>
+    requires ProcessModel<Model>
+  [[nodiscard]] CovarianceOf<State> jacobian(const State& x, const Control& u, double dt) const {
+    const Model& model = *this;
+    return automatic_jacobian([&](const auto& s) { return detail::plain(model.propagate(s, u, dt)); }, x);
+  }
+  [[nodiscard]] auto jacobian(const State& x) const
+    requires MeasurementModel<Model>
+  {
+    const Model& model = *this;
+    return automatic_jacobian([&](const auto& s) { return detail::plain(model.predict(s)); }, x);
+  }
+};
+
+template <class Model>
+[[nodiscard]] Numeric<Model> numeric(const Model& model) {
+  return {model};
+}
+template <class Model>
+[[nodiscard]] Automatic<Model> automatic(const Model& model) {
+  return {model};
+}
+
+/// Largest difference of any entry between a given Jacobian and a reference, relative to 1 + |reference|.
+struct JacobianComparison {
+  double worst = 0.0;
+  int row = 0;
+  int column = 0;
+  [[nodiscard]] bool agrees(double tolerance = 1e-6) const noexcept { return worst <= tolerance; }
+};
+
+template <class A, class B>
+[[nodiscard]] JacobianComparison compare_jacobians(const A& given, const B& reference) {
+  JacobianComparison result;
+  const auto a = detail::dense_of(given);
+  const auto b = detail::dense_of(reference);
+  for (int i = 0; i < static_cast<int>(b.rows()); ++i)
+    for (int j = 0; j < static_cast<int>(b.cols()); ++j) {
+      const double expected = static_cast<double>(b(i, j));
+      const double error = static_cast<double>(a(i, j)) - expected;
+      const double relative = (error < 0 ? -error : error) / (1.0 + (expected < 0 ? -expected : expected));
+      if (!(relative <= result.worst)) result = {relative, i, j};
+    }
+  return result;
+}
+
+/// The process's own Jacobian against central differences at (x, u, dt).
+template <LinearisedProcess F>
+[[nodiscard]] JacobianComparison check_jacobian(const F& f, const typename F::State& x,
+                                                const typename F::Control& u, double dt) {
+  return compare_jacobians(f.jacobian(x, u, dt), numeric(f).jacobian(x, u, dt));
+}
+/// The sensor's own Jacobian against central differences at x.
+template <LinearisedMeasurement H>
+[[nodiscard]] JacobianComparison check_jacobian(const H& h, const typename H::State& x) {
+  return compare_jacobians(h.jacobian(x), numeric(h).jacobian(x));
+}
+
+}  // namespace cairn::inline CAIRN_ABI

@@ -1,0 +1,88 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// What a filter asks of a model: plain structs with a few member functions.
+///
+///   struct Unicycle {
+///     using State = SE2;  using Control = Vector<2>;
+///     State propagate(const State& x, const Control& u, double dt) const;    // x at the next step, no noise
+///     Matrix<3> noise(const State& x, const Control& u, double dt) const;    // added per step, at the new x
+///     Matrix<3> jacobian(const State& x, const Control& u, double dt) const; // optional: d new / d old step
+///   };
+///   struct Compass {
+///     using State = SE2;  using Measurement = SO2;
+///     Measurement predict(const State& x) const;   // without noise
+///     Matrix<1> noise(const State& x) const;       // covariance of local(predict(x), z)
+///     Matrix<1, 3> jacobian(const State& x) const; // optional
+///   };
+///
+/// Laws, which tests check and types cannot: noise is symmetric and at least zero (a sensor's above zero),
+/// propagate(x, u, 0) = x, jacobians agree with numeric differentiation in the tangent spaces. A model whose
+/// propagate or predict is its (constant in x) jacobian times x plus something known says so with
+/// `static constexpr bool linear = true;`. Jacobians may be Structured. Nothing is differentiated silently:
+/// numeric(model) and automatic(model) of linearise.hpp are asked for by name.
+#pragma once
+
+#include <concepts>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/manifold/manifold.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// The control of a process that has none.
+struct NoControl {};
+
+/// Square matrix of the tangent space of X.
+template <Manifold X>
+using CovarianceOf = Matrix<dof<X>, dof<X>, ScalarOf<X>>;
+
+/// Matrix that maps steps of From to steps of To.
+template <Manifold To, Manifold From>
+using JacobianOf = Matrix<dof<To>, dof<From>, ScalarOf<From>>;
+
+/// How a state moves: propagate and noise.
+template <class F>
+concept ProcessModel = Manifold<typename F::State> && requires(const F& f, const typename F::State& x,
+                                                               const typename F::Control& u, double dt) {
+  { f.propagate(x, u, dt) } -> std::convertible_to<typename F::State>;
+  { f.noise(x, u, dt) } -> std::convertible_to<CovarianceOf<typename F::State>>;
+};
+
+/// A process that gives its derivative: step of the new state by step of the old.
+template <class F>
+concept LinearisedProcess = ProcessModel<F> && requires(const F& f, const typename F::State& x,
+                                                        const typename F::Control& u, double dt) {
+  { f.jacobian(x, u, dt) } -> std::convertible_to<CovarianceOf<typename F::State>>;
+};
+
+/// A process that is linear in its state.
+template <class F>
+concept LinearProcess = LinearisedProcess<F> && F::linear;
+
+/// What a sensor reports of a state: predict and noise.
+template <class H>
+concept MeasurementModel = Manifold<typename H::State> && Manifold<typename H::Measurement> &&
+                           requires(const H& h, const typename H::State& x) {
+                             { h.predict(x) } -> std::convertible_to<typename H::Measurement>;
+                             { h.noise(x) } -> std::convertible_to<CovarianceOf<typename H::Measurement>>;
+                           };
+
+/// A sensor that gives its derivative: step of the measurement by step of the state.
+template <class H>
+concept LinearisedMeasurement = MeasurementModel<H> && requires(const H& h, const typename H::State& x) {
+  { h.jacobian(x) } -> std::convertible_to<JacobianOf<typename H::Measurement, typename H::State>>;
+};
+
+/// A sensor that is linear in the state.
+template <class H>
+concept LinearMeasurement = LinearisedMeasurement<H> && H::linear;
+
+/// A process and a sensor that speak of the same state.
+template <class F, class H>
+concept StateModel =
+    ProcessModel<F> && MeasurementModel<H> && std::same_as<typename F::State, typename H::State>;
+
+}  // namespace cairn::inline CAIRN_ABI

@@ -1,0 +1,118 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The Rao-Blackwellised particle filter: particles over the hard part of the state, each carrying Gaussians
+/// over the parts that are easy once the hard part is known. With a pose as the hard part and landmarks as
+/// the easy parts this is FastSLAM (M. Montemerlo et al., AAAI 2002).
+///
+///   struct Sighting {
+///     using State = SE2;  using Part = Vector<2>;  using Measurement = Product<Vector<1>, SO2>;
+///     Measurement predict(const State& x, const Part& part) const;
+///     Matrix<2> part_jacobian(const State& x, const Part& part) const;     // by the part
+///     Matrix<2> noise(const State& x, const Part& part) const;
+///   };
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/core/random.hpp>
+#include <cairn/filter/extended.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/model.hpp>
+#include <cairn/filter/particle.hpp>
+#include <cairn/filter/status.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// What the sensor reports of one part, given the sampled state.
+template <class H>
+concept ConditionalMeasurement =
+    Manifold<typename H::State> && Manifold<typename H::Part> && Manifold<typename H::Measurement> &&
+    requires(const H& h, const typename H::State& x, const typename H::Part& part) {
+      { h.predict(x, part) } -> std::convertible_to<typename H::Measurement>;
+      {
+        h.part_jacobian(x, part)
+      } -> std::convertible_to<JacobianOf<typename H::Measurement, typename H::Part>>;
+      { h.noise(x, part) } -> std::convertible_to<CovarianceOf<typename H::Measurement>>;
+    };
+
+/// A sampled state and what is believed of each part if that sample is the truth.
+template <Manifold X, Manifold Part>
+struct ConditionalParticle {
+  X state;
+  std::vector<Gaussian<Part>> parts;
+};
+
+template <Manifold X, Manifold Part>
+using ConditionalParticles = Particles<ConditionalParticle<X, Part>>;
+
+namespace detail {
+
+/// The sensor as an ordinary one over the part, the sampled state held.
+template <ConditionalMeasurement H>
+struct HeldSensor {
+  using State = typename H::Part;
+  using Measurement = typename H::Measurement;
+  const H& sensor;
+  const typename H::State& held;
+  [[nodiscard]] Measurement predict(const State& part) const { return sensor.predict(held, part); }
+  [[nodiscard]] auto jacobian(const State& part) const { return sensor.part_jacobian(held, part); }
+  [[nodiscard]] auto noise(const State& part) const { return sensor.noise(held, part); }
+};
+
+}  // namespace detail
+
+/// The filter. Options only.
+struct RaoBlackwell {
+  Extended parts{};            ///< how the Gaussians are updated
+  ParticleFilter particles{};  ///< when and how to resample
+
+  /// Moves every sampled state and draws its noise; the parts stay.
+  template <ProcessModel F, Manifold Part>
+  Status predict(ConditionalParticles<typename F::State, Part>& belief, const F& process,
+                 const typename F::Control& control, double dt, Random& random) const {
+    Particles<typename F::State> states;
+    states.states.reserve(belief.size());
+    for (const auto& particle : belief.states) states.states.push_back(particle.state);
+    states.log_weights = belief.log_weights;
+    const Status status = particles.predict(states, process, control, dt, random);
+    if (status != Status::accepted) return status;
+    for (std::size_t i = 0; i < belief.size(); ++i) belief.states[i].state = states.states[i];
+    return status;
+  }
+
+  /// Part number `index` was seen as z: updates that part in every particle and weighs the particles by the
+  /// likelihood of z. A particle in which the update is refused gets the likelihood of the gate's edge where
+  /// it was gated, and none otherwise. Refused as a whole where an index is missing or no weight is left.
+  template <ConditionalMeasurement H>
+  Status update(ConditionalParticles<typename H::State, typename H::Part>& belief, std::size_t index,
+                const H& sensor, const typename H::Measurement& z, Random& random) const {
+    if (belief.states.empty()) return Status::depleted;
+    std::vector<double> log_likelihoods(belief.size());
+    std::vector<Gaussian<typename H::Part>> next;
+    next.reserve(belief.size());
+    for (std::size_t i = 0; i < belief.size(); ++i) {
+      const auto& particle = belief.states[i];
+      if (index >= particle.parts.size()) return Status::size_mismatch;
+      next.push_back(particle.parts[index]);
+      auto in = parts.update(next.back(), detail::HeldSensor<H>{sensor, particle.state}, z);
+      if (in.status == Status::gated) in.nis = static_cast<decltype(in.nis)>(parts.gate);
+      const bool usable = in.accepted() || in.status == Status::gated;
+      log_likelihoods[i] =
+          usable ? static_cast<double>(in.log_likelihood()) : -std::numeric_limits<double>::infinity();
+    }
+    const std::vector<ConditionalParticle<typename H::State, typename H::Part>> before = belief.states;
+    for (std::size_t i = 0; i < belief.size(); ++i) belief.states[i].parts[index] = next[i];
+    const Status status = particles.update_with(belief, log_likelihoods, random);
+    if (status != Status::accepted) belief.states = before;
+    return status;
+  }
+};
+
+}  // namespace cairn::inline CAIRN_ABI

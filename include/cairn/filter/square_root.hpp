@@ -1,0 +1,288 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// Square-root filters: the belief carries L with P = L L^T, so P cannot lose its definiteness and keeps
+/// twice the digits.
+///
+/// Every step is one orthogonal triangularisation of an array (no Cholesky downdate anywhere):
+///   predict   [F L, Q^1/2] -> [L', 0]
+///   update    [R^1/2  H L; 0  L] -> [S^1/2 0; K S^1/2  L']
+///   unscented the columns odd, even and m of sigma_points.hpp in place of F L and H L
+/// (P. Kaminski, A. Bryson, S. Schmidt, "Discrete square root filtering", IEEE Trans. Automatic Control 16,
+/// 1971; R. van der Merwe, E. Wan, "The square-root unscented Kalman filter", ICASSP 2001.)
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <limits>
+#include <type_traits>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/filter/correct.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/model.hpp>
+#include <cairn/filter/sigma_points.hpp>
+#include <cairn/filter/status.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// Truth = retract(mean, d), d ~ N(0, root root^T), root lower triangular.
+template <Manifold X>
+struct SquareRootGaussian {
+  using State = X;
+  X mean;
+  CovarianceOf<X> root;
+
+  [[nodiscard]] static SquareRootGaussian from(const Gaussian<X>& belief) {
+    return {belief.mean, detail::semi_definite_root<dof<X>, ScalarOf<X>>(belief.covariance)};
+  }
+  [[nodiscard]] CovarianceOf<X> covariance() const { return root * root.transpose(); }
+  [[nodiscard]] Gaussian<X> gaussian() const { return {mean, covariance()}; }
+};
+
+namespace detail {
+
+/// Householder: makes the C x R matrix `a` upper triangular in its first R rows, a^T a unchanged, diagonal
+/// not negative. C >= R.
+template <int C, int R, class S>
+void triangularise(Matrix<C, R, S>& a) {
+  using std::sqrt;
+  const int rows = static_cast<int>(a.rows());
+  const int columns = static_cast<int>(a.cols());
+  for (int k = 0; k < columns; ++k) {
+    S squared(0);
+    for (int i = k + 1; i < rows; ++i) squared += a(i, k) * a(i, k);
+    const S head = a(k, k);
+    const S norm = sqrt(head * head + squared);
+    if (squared > S(0)) {
+      const S first =
+          head > S(0) ? -squared / (head + norm) : head - norm;  // head - norm without cancellation
+      const S factor = S(2) / (first * first + squared);
+      for (int j = k + 1; j < columns; ++j) {
+        S dot = first * a(k, j);
+        for (int i = k + 1; i < rows; ++i) dot += a(i, k) * a(i, j);
+        dot *= factor;
+        a(k, j) -= dot * first;
+        for (int i = k + 1; i < rows; ++i) a(i, j) -= dot * a(i, k);
+      }
+    } else if (head < S(0)) {
+      for (int j = k + 1; j < columns; ++j) a(k, j) = -a(k, j);
+    }
+    a(k, k) = norm;
+    for (int i = k + 1; i < rows; ++i) a(i, k) = S(0);
+  }
+}
+
+template <int A, int B>
+inline constexpr int size_sum = A == dynamic || B == dynamic ? dynamic : A + B;
+
+/// The transpose of the upper triangle of `array` that starts at (from, from).
+template <class Root, class Array>
+[[nodiscard]] Root lower_part(const Array& array, int from, int size) {
+  Root root = Root::Zero(size, size);
+  for (int j = 0; j < size; ++j)
+    for (int i = j; i < size; ++i) root(i, j) = array(from + j, from + i);
+  return root;
+}
+
+/// Keeps L' = top^T of a triangularised array if it is finite.
+template <Manifold X, class Array>
+Status keep_root(SquareRootGaussian<X>& belief, const X& mean, const Array& array, int n) {
+  const CovarianceOf<X> root = lower_part<CovarianceOf<X>>(array, 0, n);
+  if (!all_finite(root) || !finite_state(mean)) return Status::not_finite;
+  belief.mean = mean;
+  belief.root = root;
+  return Status::accepted;
+}
+
+/// The update from a filled array of M + N columns, [S-part; P-part] transposed.
+template <Manifold X, int M, class Array>
+[[nodiscard]] Innovation<M, ScalarOf<X>> correct_by_array(SquareRootGaussian<X>& belief, Array& array,
+                                                          const Vector<M, ScalarOf<X>>& residual,
+                                                          double gate) {
+  using S = ScalarOf<X>;
+  const int m = static_cast<int>(residual.size());
+  const int n = static_cast<int>(belief.root.rows());
+  const bool finite_array = all_finite(array);
+  triangularise(array);
+  const Matrix<M, M, S> root_s = lower_part<Matrix<M, M, S>>(array, 0, m);
+  Innovation<M, S> in = fresh_innovation<M, S>(residual, root_s * root_s.transpose());
+  Vector<M, S> y = residual;
+  bool regular = true;
+  for (int i = 0; i < m; ++i) {
+    for (int k = 0; k < i; ++k) y(i) -= root_s(i, k) * y(k);
+    regular = regular && root_s(i, i) > S(0);
+    y(i) /= root_s(i, i);
+  }
+  in.nis = y.dot(y);
+  const CovarianceOf<X> root = lower_part<CovarianceOf<X>>(array, m, n);
+  Tangent<X> step = Tangent<X>::Zero(n);
+  for (int i = 0; i < n; ++i)
+    for (int k = 0; k < m; ++k) step(i) += array(k, m + i) * y(k);
+  if (!(gate > 0.0))
+    in.status = Status::bad_option;
+  else if (!finite_array || !all_finite(residual) || !finite_state(belief.mean))
+    in.status = Status::not_finite;
+  else if (!regular || !all_finite(root) || !all_finite(step))
+    in.status = Status::not_positive_definite;
+  else if (!(in.nis <= static_cast<S>(gate)))
+    in.status = Status::gated;
+  if (in.status != Status::accepted) return in;
+  belief.mean = retract(belief.mean, step);
+  belief.root = root;
+  return in;
+}
+
+}  // namespace detail
+
+/// Square-root form of the Kalman and extended Kalman filters. Options only.
+struct SquareRoot {
+  double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
+
+  template <LinearisedProcess F>
+  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process,
+                 const typename F::Control& control, double dt) const {
+    using X = typename F::State;
+    using S = ScalarOf<X>;
+    constexpr int n = dof<X>;
+    if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
+    const int size = static_cast<int>(belief.root.rows());
+    const CovarianceOf<X> f = detail::dense_of(process.jacobian(belief.mean, control, dt));
+    const CovarianceOf<X> q = process.noise(belief.mean, control, dt);
+    if (f.cols() != size || f.rows() != size || q.rows() != size) return Status::size_mismatch;
+    if (!detail::all_finite(q)) return Status::not_finite;
+    if (!detail::is_valid_covariance<n, S>(q)) return Status::not_positive_definite;
+    Matrix<detail::size_sum<n, n>, n, S> array(2 * size, size);
+    array.topRows(size) = (f * belief.root).transpose();
+    array.bottomRows(size) = detail::semi_definite_root<n, S>(q).transpose();
+    detail::triangularise(array);
+    return detail::keep_root(belief, X(process.propagate(belief.mean, control, dt)), array, size);
+  }
+  template <LinearisedProcess F>
+    requires std::same_as<typename F::Control, NoControl>
+  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, double dt) const {
+    return predict(belief, process, NoControl{}, dt);
+  }
+
+  template <LinearisedMeasurement H>
+  Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
+      SquareRootGaussian<typename H::State>& belief, const H& sensor,
+      const typename H::Measurement& z) const {
+    using X = typename H::State;
+    using Z = typename H::Measurement;
+    using S = ScalarOf<X>;
+    constexpr int n = dof<X>;
+    constexpr int m = dof<Z>;
+    const Vector<m, S> residual = local(Z(sensor.predict(belief.mean)), z);
+    const Matrix<m, n, S> h = detail::dense_of(sensor.jacobian(belief.mean));
+    const Matrix<m, m, S> r = sensor.noise(belief.mean);
+    const int ms = static_cast<int>(residual.size());
+    const int ns = static_cast<int>(belief.root.rows());
+    if (h.rows() != ms || h.cols() != ns || r.rows() != ms) {
+      auto in = detail::fresh_innovation<m, S>(residual, r);
+      in.status = Status::size_mismatch;
+      return in;
+    }
+    Matrix<detail::size_sum<m, n>, detail::size_sum<m, n>, S> array(ms + ns, ms + ns);
+    array.setZero();
+    array.topLeftCorner(ms, ms) = detail::semi_definite_root<m, S>(r).transpose();
+    array.bottomLeftCorner(ns, ms) = (h * belief.root).transpose();
+    array.bottomRightCorner(ns, ns) = belief.root.transpose();
+    if (!detail::all_finite(r)) array(0, 0) = std::numeric_limits<S>::quiet_NaN();
+    return detail::correct_by_array<X, m>(belief, array, residual, gate);
+  }
+};
+
+/// Square-root unscented (and, with alpha = 1 and beta = 1, third-order) filter. Needs beta >= alpha^2, so
+/// that nothing is ever subtracted; refuses other options. Options only.
+struct SquareRootUnscented {
+  SigmaPoints points{};
+  double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
+
+  template <ProcessModel F>
+  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process,
+                 const typename F::Control& control, double dt) const {
+    using X = typename F::State;
+    using S = ScalarOf<X>;
+    constexpr int n = dof<X>;
+    if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
+    const int size = static_cast<int>(belief.root.rows());
+    if (!sound(size)) return Status::bad_option;
+    const CovarianceOf<X> q = process.noise(belief.mean, control, dt);
+    if (!detail::all_finite(q)) return Status::not_finite;
+    if (!detail::is_valid_covariance<n, S>(q)) return Status::not_positive_definite;
+    constexpr int rows = n == dynamic ? dynamic : 3 * n + 1;
+    Matrix<rows, n, S> array(3 * size + 1, size);
+    const auto f = [&](const X& x) -> X { return process.propagate(x, control, dt); };
+    const X mean = spread(belief, f, array);
+    array.bottomRows(size) = detail::semi_definite_root<n, S>(q).transpose();
+    detail::triangularise(array);
+    return detail::keep_root(belief, mean, array, size);
+  }
+  template <ProcessModel F>
+    requires std::same_as<typename F::Control, NoControl>
+  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, double dt) const {
+    return predict(belief, process, NoControl{}, dt);
+  }
+
+  template <MeasurementModel H>
+  Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
+      SquareRootGaussian<typename H::State>& belief, const H& sensor,
+      const typename H::Measurement& z) const {
+    using X = typename H::State;
+    using Z = typename H::Measurement;
+    using S = ScalarOf<X>;
+    constexpr int n = dof<X>;
+    constexpr int m = dof<Z>;
+    const Matrix<m, m, S> r = sensor.noise(belief.mean);
+    const int ns = static_cast<int>(belief.root.rows());
+    const int ms = static_cast<int>(r.rows());
+    constexpr int rows = n == dynamic || m == dynamic ? dynamic : 2 * n + 1 + m;
+    Matrix<rows, detail::size_sum<m, n>, S> array(2 * ns + 1 + ms, ms + ns);
+    array.setZero();
+    Matrix<n == dynamic ? dynamic : 2 * n + 1, m, S> seen(2 * ns + 1, ms);
+    const auto h = [&](const X& x) -> Z { return sensor.predict(x); };
+    const Z mean = spread(belief, h, seen);
+    array.topLeftCorner(2 * ns + 1, ms) = seen;
+    array.block(0, ms, ns, ns) = belief.root.transpose();
+    array.bottomLeftCorner(ms, ms) = detail::semi_definite_root<m, S>(r).transpose();
+    if (!detail::all_finite(r)) array(0, 0) = std::numeric_limits<S>::quiet_NaN();
+    return detail::correct_by_array<X, m>(belief, array, local(mean, z), sound(ns) ? gate : 0.0);
+  }
+
+private:
+  [[nodiscard]] bool sound(int n) const noexcept {
+    return points.spread_squared(n) > 0.0 && points.beta >= points.alpha * points.alpha;
+  }
+
+  /// Rows: odd_i / c for i < n, even_i / c, sqrt(beta - alpha^2) m. Returns the transformed mean.
+  template <Manifold X, class F, class Array>
+  auto spread(const SquareRootGaussian<X>& belief, const F& f, Array& rows) const {
+    using S = ScalarOf<X>;
+    using Y = std::decay_t<decltype(f(belief.mean))>;
+    using std::sqrt;
+    const int n = static_cast<int>(belief.root.rows());
+    const S wanted = sqrt(static_cast<S>(points.spread_squared(n)));
+    const S nearest = sqrt(sqrt(std::numeric_limits<S>::epsilon()));
+    const S c = wanted > nearest ? wanted : nearest;
+    const Y center = f(belief.mean);
+    Tangent<Y> mean = Tangent<Y>::Zero(dof_of(center));
+    for (int i = 0; i < n; ++i) {
+      const Tangent<X> step = c * belief.root.col(i);
+      const Tangent<Y> up = local(center, Y(f(retract(belief.mean, step))));
+      const Tangent<Y> down = local(center, Y(f(retract(belief.mean, Tangent<X>(-step)))));
+      const Tangent<Y> odd = S(0.5) * (up - down);
+      Tangent<Y> even = S(0.5) * (up + down);
+      detail::drop_noise<Y>(center, odd, even);
+      rows.row(i) = odd.transpose() / c;
+      rows.row(n + i) = even.transpose() / c;
+      mean += even / (c * c);
+    }
+    rows.row(2 * n) = sqrt(static_cast<S>(points.beta - points.alpha * points.alpha)) * mean.transpose();
+    return retract(center, mean);
+  }
+};
+
+}  // namespace cairn::inline CAIRN_ABI

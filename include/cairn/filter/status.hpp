@@ -1,0 +1,101 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// What a step of a filter says about itself: its status, and the innovation of a measurement.
+///
+/// A step that is not `accepted` has left the belief as it was, bit for bit.
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include <Eigen/Core>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// Verdict of one predict or update.
+enum class [[nodiscard]] Status {
+  accepted,               ///< the belief holds the result
+  gated,                  ///< the measurement lies outside the gate
+  not_finite,             ///< NaN or infinity in the belief, model, control or measurement
+  not_positive_definite,  ///< the innovation's covariance or the result is not a covariance
+  bad_time_step,          ///< dt is negative, or not finite
+  bad_option,             ///< an option of the filter is outside its range
+  size_mismatch,          ///< run-time sizes do not fit together
+  depleted,               ///< no particle, or no weight, or no mode is left
+  not_converged,          ///< an iteration stopped before its tolerance
+};
+
+/// The status as a sentence for a log.
+[[nodiscard]] constexpr const char* explain(Status status) noexcept {
+  switch (status) {
+    case Status::accepted:
+      return "accepted";
+    case Status::gated:
+      return "refused: the measurement lies outside the gate";
+    case Status::not_finite:
+      return "refused: NaN or infinity in the belief, the model or the measurement";
+    case Status::not_positive_definite:
+      return "refused: a covariance is not positive definite";
+    case Status::bad_time_step:
+      return "refused: the time step is negative or not finite";
+    case Status::bad_option:
+      return "refused: an option of the filter is out of range";
+    case Status::size_mismatch:
+      return "refused: sizes of belief, model and measurement differ";
+    case Status::depleted:
+      return "refused: no particle or mode has any weight left";
+    case Status::not_converged:
+      return "refused: the iteration did not converge";
+  }
+  return "unknown status";
+}
+
+namespace detail {
+
+/// log det of a symmetric positive definite matrix; NaN where it is not.
+template <int M, class S>
+[[nodiscard]] S log_determinant(const Matrix<M, M, S>& a) {
+  using std::log;
+  const int m = static_cast<int>(a.rows());
+  Matrix<M, M, S> lower = a;
+  S sum(0);
+  for (int j = 0; j < m; ++j) {
+    const S pivot = lower(j, j);
+    if (!(pivot > S(0))) return std::numeric_limits<S>::quiet_NaN();
+    sum += log(pivot);
+    for (int k = j + 1; k < m; ++k)
+      for (int i = k; i < m; ++i) lower(i, k) -= lower(i, j) * lower(k, j) / pivot;
+  }
+  return sum;
+}
+
+}  // namespace detail
+
+/// What a measurement of M numbers brought: residual z - h(x) (a tangent vector), its predicted covariance
+/// S = H P H^T + R, and nis = residual^T S^-1 residual, which is chi-square of M degrees of freedom when the
+/// filter is consistent. Where the status is not accepted, later fields may not have been computed (zero).
+template <int M, class S = double>
+struct [[nodiscard]] Innovation {
+  Vector<M, S> residual{};
+  Matrix<M, M, S> covariance{};
+  S nis = S(0);
+  Status status = Status::accepted;
+
+  [[nodiscard]] bool accepted() const noexcept { return status == Status::accepted; }
+
+  /// Natural logarithm of the Gaussian density of the residual: the measurement's contribution to the
+  /// likelihood of the model. O(M^3), computed on demand.
+  [[nodiscard]] S log_likelihood() const {
+    const S two_pi = S(6.283185307179586476925286766559L);
+    using std::log;
+    return S(-0.5) *
+           (nis + detail::log_determinant(covariance) + static_cast<S>(residual.size()) * log(two_pi));
+  }
+};
+
+}  // namespace cairn::inline CAIRN_ABI

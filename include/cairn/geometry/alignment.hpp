@@ -1,0 +1,229 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The rigid motion, or similarity, that carries one set of points onto another.
+///
+/// Minimises sum w |y - (c R x + t)|^2. With centred points and S = sum w x y^T, the rotation is the unit
+/// quaternion q that maximises q^T N q, N the symmetric 4x4 matrix of S (B. Horn, "Closed-form solution of
+/// absolute orientation using unit quaternions", JOSA A 4, 1987); the scale c = q^T N q / sum w |x|^2 and
+/// t = y_mean - c R x_mean are those of S. Umeyama (IEEE T-PAMI 13, 1991), who reaches the same optimum by an
+/// SVD.
+///
+/// The eigenvalues of N are s1+s2+s3, s1-s2-s3, -s1+s2-s3, -s1-s2+s3 with s1 >= s2 >= |s3| the singular
+/// values of S, s3 < 0 where a reflection would fit better: rank and ambiguity are read from them. O(n).
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+
+#include <cairn/core/check.hpp>
+#include <cairn/core/linalg.hpp>
+#include <cairn/manifold/se3.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+enum class AlignmentStatus {
+  good,
+  ambiguous,  ///< fewer than three points, or points on a line or in one place: the rotation is not
+              ///< determined
+  mirrored    ///< a reflection fits far better than any rotation; the best rotation is returned
+};
+
+struct AlignmentOptions {
+  bool with_scale = false;  ///< also estimate c; otherwise c = 1
+  double tolerance = 1e-9;  ///< singular values below tolerance * s1 count as zero
+};
+
+/// Result: y ~ scale * R x + t with T_target_source = (R, t).
+struct Alignment {
+  SE3 T_target_source;
+  double scale = 1;
+  int rank = 0;         ///< of the point sets: 3 space, 2 plane, 1 line, 0 one place
+  double rms = 0;       ///< root of the weighted mean squared distance that is left
+  double variance = 0;  ///< estimated variance of a point of weight 1: weighted squares / (3n - 6 or 7)
+  /// Of a right step (translation, rotation) of T_target_source, scale held, where w are inverse variances
+  /// [1/m^2] per coordinate; with other weights multiply the covariance by `variance`.
+  Matrix<6> information = Matrix<6>::Zero();
+  std::optional<Matrix<6>> covariance;  ///< inverse of information, where that exists
+  AlignmentStatus status = AlignmentStatus::ambiguous;
+  [[nodiscard]] bool good() const noexcept { return status == AlignmentStatus::good; }
+};
+
+namespace detail {
+
+/// Eigenvalues, largest first, and the matching unit eigenvectors as columns, of a symmetric 4x4 matrix:
+/// Jacobi's rotations until nothing is left off the diagonal.
+struct SymmetricEigen4 {
+  Vector<4> values;
+  Matrix<4> vectors;
+};
+
+[[nodiscard]] inline SymmetricEigen4 symmetric_eigen(Matrix<4> a) {
+  Matrix<4> v = Matrix<4>::Identity();
+  const auto rotate = [&](int p, int q) {
+    const double theta = (a(q, q) - a(p, p)) / (2 * a(p, q));
+    const double t = (theta >= 0 ? 1 : -1) / (std::abs(theta) + std::sqrt(theta * theta + 1));
+    const double c = 1 / std::sqrt(t * t + 1), s = t * c;
+    for (int k = 0; k < 4; ++k) {
+      const double kp = a(k, p), kq = a(k, q);
+      a(k, p) = c * kp - s * kq;
+      a(k, q) = s * kp + c * kq;
+      const double vp = v(k, p), vq = v(k, q);
+      v(k, p) = c * vp - s * vq;
+      v(k, q) = s * vp + c * vq;
+    }
+    for (int k = 0; k < 4; ++k) {
+      const double pk = a(p, k), qk = a(q, k);
+      a(p, k) = c * pk - s * qk;
+      a(q, k) = s * pk + c * qk;
+    }
+    a(p, q) = a(q, p) = 0;
+  };
+  for (int sweep = 0; sweep < 30; ++sweep) {
+    double largest = 0;
+    for (int p = 0; p < 3; ++p)
+      for (int q = p + 1; q < 4; ++q) {
+        const double size = std::abs(a(p, q));
+        // Smaller than rounding of both diagonal entries: a rotation would change nothing.
+        if (size <= 1e-17 * (std::abs(a(p, p)) + std::abs(a(q, q)))) continue;
+        largest = std::max(largest, size);
+        rotate(p, q);
+      }
+    if (largest == 0) break;
+  }
+  SymmetricEigen4 result{a.diagonal(), v};
+  for (int i = 0; i < 3; ++i)
+    for (int j = 3; j > i; --j)
+      if (result.values(j) > result.values(j - 1)) {
+        std::swap(result.values(j), result.values(j - 1));
+        result.vectors.col(j).swap(result.vectors.col(j - 1));
+      }
+  return result;
+}
+
+/// Horn's matrix of S = sum w x y^T.
+[[nodiscard]] inline Matrix<4> horn_matrix(const Matrix<3>& S) {
+  Matrix<4> N;
+  N << S(0, 0) + S(1, 1) + S(2, 2), S(1, 2) - S(2, 1), S(2, 0) - S(0, 2), S(0, 1) - S(1, 0),  //
+      0, S(0, 0) - S(1, 1) - S(2, 2), S(0, 1) + S(1, 0), S(2, 0) + S(0, 2),                   //
+      0, 0, S(1, 1) - S(0, 0) - S(2, 2), S(1, 2) + S(2, 1),                                   //
+      0, 0, 0, S(2, 2) - S(0, 0) - S(1, 1);
+  for (int i = 1; i < 4; ++i)
+    for (int j = 0; j < i; ++j) N(i, j) = N(j, i);
+  return N;
+}
+
+/// Sums over both point sets, centred.
+struct AlignmentMoments {
+  double weight = 0;
+  Vector<3> source_mean = Vector<3>::Zero(), target_mean = Vector<3>::Zero();
+  Matrix<3> cross = Matrix<3>::Zero();   // sum w x y^T
+  Matrix<3> source = Matrix<3>::Zero();  // sum w x x^T
+  double target_squares = 0;             // sum w |y|^2
+};
+
+[[nodiscard]] inline AlignmentMoments alignment_moments(std::span<const Vector<3>> source,
+                                                        std::span<const Vector<3>> target,
+                                                        std::span<const double> weights) {
+  AlignmentMoments m;
+  const auto weight = [&](std::size_t i) { return weights.empty() ? 1.0 : weights[i]; };
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    m.weight += weight(i);
+    m.source_mean += weight(i) * source[i];
+    m.target_mean += weight(i) * target[i];
+  }
+  if (!(m.weight > 0)) return m;
+  m.source_mean /= m.weight;
+  m.target_mean /= m.weight;
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    const Vector<3> x = source[i] - m.source_mean, y = target[i] - m.target_mean;
+    const Vector<3> wx = weight(i) * x;
+    m.cross += wx * y.transpose();
+    m.source += wx * x.transpose();
+    m.target_squares += weight(i) * y.squaredNorm();
+  }
+  return m;
+}
+
+[[noreturn, gnu::cold, gnu::noinline]] inline void refuse_alignment(std::span<const Vector<3>> source,
+                                                                    std::span<const Vector<3>> target,
+                                                                    std::span<const double> weights) {
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    if (!source[i].allFinite() || !target[i].allFinite())
+      raise("align_points: expected finite coordinates, pair " + std::to_string(i) + " has others");
+    if (!weights.empty() && !(weights[i] >= 0 && std::isfinite(weights[i])))
+      raise("align_points: expected finite weights >= 0, pair " + std::to_string(i) + " has another");
+  }
+  raise("align_points: coordinates so large that their squares overflow");
+}
+
+/// Inverse of the centred information: translation and rotation decouple at the centroid of R^T (y - t).
+inline void alignment_covariance(const AlignmentMoments& m, double scale, bool determined,
+                                 Alignment& result) {
+  const Vector<3> centre = scale * m.source_mean;
+  const Matrix<3> scatter = scale * scale * m.source, lever = skew(centre);
+  const Matrix<3> rotation = scatter.trace() * Matrix<3>::Identity() - scatter;
+  result.information << m.weight * Matrix<3>::Identity(), -m.weight * lever, m.weight * lever,
+      rotation - m.weight * lever * lever;
+  if (!determined) return;
+  const Matrix<3> c = symmetrised(rotation.llt().solve(Matrix<3>::Identity()));
+  Matrix<6> covariance;
+  covariance << Matrix<3>::Identity() / m.weight - lever * c * lever, lever * c, -c * lever, c;
+  result.covariance = symmetrised(covariance);
+}
+
+}  // namespace detail
+
+/// The motion that carries `source` onto `target`, pair by pair, with optional weights >= 0 (one each).
+/// Throws Error, naming the pair, where a number is not finite.
+[[nodiscard]] inline Alignment align_points(std::span<const Vector<3>> source,
+                                            std::span<const Vector<3>> target,
+                                            std::span<const double> weights = {},
+                                            const AlignmentOptions& options = {}) {
+  CAIRN_EXPECTS(source.size() == target.size(), "align_points: both sets need the same number of points");
+  CAIRN_EXPECTS(weights.empty() || weights.size() == source.size(), "align_points: one weight a pair");
+  Alignment result;
+  if (source.empty()) return result;
+  const detail::AlignmentMoments m = detail::alignment_moments(source, target, weights);
+  const double squares = m.source.trace() + m.target_squares;
+  if (!(std::isfinite(squares) && m.weight >= 0 && m.cross.allFinite()))
+    detail::refuse_alignment(source, target, weights);
+  for (const double weight : weights)
+    if (!(weight >= 0)) detail::refuse_alignment(source, target, weights);
+  if (m.weight == 0) return result;
+
+  const detail::SymmetricEigen4 eigen = detail::symmetric_eigen(detail::horn_matrix(m.cross));
+  const Vector<4> q = eigen.vectors.col(0);
+  const SO3 R = SO3::from_quaternion(q(0), q(1), q(2), q(3));
+  const double s1 = 0.5 * (eigen.values(0) + eigen.values(1)), s2 = 0.5 * (eigen.values(0) + eigen.values(2)),
+               s3 = 0.5 * (eigen.values(0) + eigen.values(3));
+  const double fit = eigen.values(0), source_squares = m.source.trace(), zero = options.tolerance * s1;
+  if (options.with_scale && source_squares > 0 && fit > 0) result.scale = fit / source_squares;
+  result.T_target_source = SE3(R, m.target_mean - result.scale * R.rotate(m.source_mean));
+
+  // Sets far from the origin have moments of rounding size: they are one place.
+  const double far = std::max(m.source_mean.squaredNorm(), m.target_mean.squaredNorm());
+  const bool one_place = !(s1 > 1e-28 * m.weight * far);
+  result.rank = one_place ? 0 : 1 + (s2 > zero) + (std::abs(s3) > zero);
+  const double left =
+      std::max(0.0, m.target_squares - 2 * result.scale * fit + result.scale * result.scale * source_squares);
+  const double reflected = std::max(0.0, left + 4 * result.scale * std::min(s3, 0.0));
+  const double dof = 3.0 * static_cast<double>(source.size()) - (options.with_scale ? 7 : 6);
+  result.rms = std::sqrt(left / m.weight);
+  result.variance = left / std::max(dof, 1.0);
+
+  const bool determined = !one_place && s2 + s3 > zero;  // half the gap between the two largest eigenvalues
+  if (determined)
+    result.status =
+        s3 < -1e-3 * s1 && reflected < 0.25 * left ? AlignmentStatus::mirrored : AlignmentStatus::good;
+  detail::alignment_covariance(m, result.scale, determined, result);
+  return result;
+}
+
+}  // namespace cairn::inline CAIRN_ABI

@@ -1,0 +1,216 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// Keeps a stereo rig calibrated while it is used: a Kalman filter on the five numbers that epipolar
+/// residuals can see.
+///
+/// State (w_x, w_y, w_z, t_y, t_z): a right rotation of the right camera [rad], and the direction of the
+/// baseline, turned by angles towards the second and third of the orthonormal axes u1 = t0/|t0|, u2 near y,
+/// u3:
+///   R = R0 exp(w),   t / |t| = (u1 + t_y u2 + t_z u3) / |...|                            (1)
+/// Its length is not observable. Random walk; each match is one scalar measurement, the epipolar constraint
+/// e = a . (t x R b) = 0 divided by its standard deviation, with
+///   d e / d w = b x R^T (a x t),   d e / d t = R b x a                                   (2)
+/// Vertical disparity sees w_x and w_z well, w_y only through x y and through the spread of depth: its
+/// variance says so, and it is the one that ruins depth (d z = z^2 w_y / b).
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <cairn/core/check.hpp>
+#include <cairn/core/linalg.hpp>
+#include <cairn/core/statistics.hpp>
+#include <cairn/geometry/stereo_rig.hpp>
+#include <cairn/manifold/se3.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// A left and a right pixel of the same point.
+struct PixelPair {
+  Vector<2> left, right;
+};
+
+struct CalibrationDriftOptions {
+  bool enabled = true;          ///< false: corrected() stays the rig given, bit for bit
+  double initial_sigma = 1e-3;  ///< of each of the five numbers [rad]
+  double walk_rotation = 3e-5;  ///< random walk of the rotation [rad / sqrt(frame)]
+  double walk_baseline = 1e-5;  ///< of the baseline's direction [rad / sqrt(frame)]
+  double pixel_sigma = 0.5;     ///< noise of a coordinate [pixels]
+  double gate = 3.5;            ///< matches whose innovation exceeds this many deviations are left out
+  double unhealthy_distance =
+      1.5;  ///< typical epipolar distance at which depth is not to be trusted [pixels]
+};
+
+/// What an update saw. Distances are robust: 1.4826 times the median of the absolute values.
+struct CalibrationHealth {
+  double distance_before = 0;  ///< typical epipolar distance with the correction so far [pixels]
+  double distance_after = 0;   ///< with the correction updated
+  std::size_t used = 0, gated = 0;
+  bool healthy = true;  ///< distance_after below unhealthy_distance
+};
+
+/// The filter. Needs a rig with a baseline.
+class CalibrationDrift {
+public:
+  explicit CalibrationDrift(const StereoRig& nominal, const CalibrationDriftOptions& options = {})
+      : nominal_(nominal), options_(options), state_(Vector<5>::Zero()) {
+    CAIRN_EXPECTS(nominal.baseline() > 0, "CalibrationDrift: the rig needs a baseline");
+    const Vector<3> u1 = nominal.T_left_right.translation() / nominal.baseline();
+    const int least = std::abs(u1(1)) < 0.9 ? 1 : 2;
+    Vector<3> u2 = Vector<3>::Unit(least) - u1(least) * u1;
+    u2 /= u2.norm();
+    axes_ << u1, u2, detail::cross<double>(u1, u2);
+    covariance_ = Matrix<5>::Identity() * options.initial_sigma * options.initial_sigma;
+  }
+
+  /// The rig with the correction so far.
+  [[nodiscard]] StereoRig corrected() const {
+    if (!options_.enabled) return nominal_;
+    StereoRig rig = nominal_;
+    rig.T_left_right = SE3(rotation(), nominal_.baseline() * direction());
+    return rig;
+  }
+
+  [[nodiscard]] const Vector<5>& state() const noexcept { return state_; }
+  [[nodiscard]] const Matrix<5>& covariance() const noexcept { return covariance_; }
+
+  /// Takes the pairs of one frame. Pairs without rays are ignored. O(pairs).
+  CalibrationHealth update(std::span<const PixelPair> pairs) {
+    const std::vector<Rays> rays = normalise(pairs);
+    CalibrationHealth health;
+    health.distance_before = typical_distance(rays);
+    if (options_.enabled && !rays.empty()) {
+      walk();
+      if (surprised(rays)) start_again(rays);
+      for (const Rays& pair : rays) (absorb(pair) ? health.used : health.gated) += 1;
+      covariance_ = symmetrised(covariance_);
+    }
+    health.distance_after = typical_distance(rays);
+    health.healthy = health.distance_after < options_.unhealthy_distance;
+    return health;
+  }
+
+private:
+  struct Rays {
+    Vector<2> left, right;  // normalised coordinates
+  };
+
+  struct Innovation {
+    double value;     // epipolar residual over its standard deviation
+    double variance;  // 1 + H P H^T
+    Vector<5> H, PHt;
+  };
+
+  [[nodiscard]] SO3 rotation() const { return nominal_.T_left_right.rotation() * SO3::exp(state_.head<3>()); }
+  [[nodiscard]] Vector<3> direction() const {
+    const Vector<3> along = axes_ * Vector<3>(1, state_(3), state_(4));
+    return along / along.norm();
+  }
+
+  [[nodiscard]] std::vector<Rays> normalise(std::span<const PixelPair> pairs) const {
+    std::vector<Rays> rays;
+    rays.reserve(pairs.size());
+    for (const PixelPair& pair : pairs) {
+      const auto l = nominal_.left.normalise(pair.left), r = nominal_.right.normalise(pair.right);
+      if (l && r) rays.push_back({*l, *r});
+    }
+    return rays;
+  }
+
+  void walk() {
+    const double rotation = options_.walk_rotation * options_.walk_rotation,
+                 baseline = options_.walk_baseline * options_.walk_baseline;
+    covariance_.diagonal().head<3>().array() += rotation;
+    covariance_.diagonal().tail<2>().array() += baseline;
+  }
+
+  [[nodiscard]] Innovation innovation(const Rays& pair) const {
+    const Vector<3> a(pair.left(0), pair.left(1), 1), b(pair.right(0), pair.right(1), 1), t = direction();
+    const Matrix<3> R = rotation().matrix();
+    const Vector<3> m = detail::cross<double>(a, t), Rb = R * b;
+    const Vector<3> left_line = detail::cross<double>(t, Rb), right_line = R.transpose() * m;
+    const double fx_l = nominal_.left.fx(), fy_l = nominal_.left.fy(), fx_r = nominal_.right.fx(),
+                 fy_r = nominal_.right.fy();
+    const double sigma =
+        options_.pixel_sigma * std::sqrt(squared(left_line(0) / fx_l) + squared(left_line(1) / fy_l) +
+                                         squared(right_line(0) / fx_r) + squared(right_line(1) / fy_r));
+    Vector<5> H;  // (2)
+    H.head<3>() = detail::cross<double>(b, right_line);
+    H.tail<2>() = axes_.rightCols<2>().transpose() * detail::cross<double>(Rb, a);
+    H /= std::max(sigma, 1e-12);
+    Innovation result;
+    result.value = -a.dot(left_line) / std::max(sigma, 1e-12);
+    result.H = H;
+    result.PHt = covariance_ * H;
+    result.variance = 1 + H.dot(result.PHt);
+    return result;
+  }
+
+  /// One scalar Kalman update; false where the gate refuses the pair.
+  bool absorb(const Rays& pair) {
+    const Innovation z = innovation(pair);
+    if (!(z.value * z.value <= options_.gate * options_.gate * z.variance)) return false;
+    state_ += z.PHt * (z.value / z.variance);
+    covariance_ -= z.PHt * z.PHt.transpose() / z.variance;
+    return true;
+  }
+
+  /// Whether most pairs fall out of the gate: the rig moved by more than the walk foresees.
+  [[nodiscard]] bool surprised(const std::vector<Rays>& rays) const {
+    std::size_t outside = 0;
+    for (const Rays& pair : rays) {
+      const Innovation z = innovation(pair);
+      outside += z.value * z.value > options_.gate * options_.gate * z.variance;
+    }
+    return 2 * outside > rays.size();
+  }
+
+  /// Makes the covariance as wide as the residuals are, and leads the state into the basin of most pairs:
+  /// reweighted least squares (Cauchy) whose scale follows the median residual down.
+  void start_again(const std::vector<Rays>& rays) {
+    const double focal = 0.5 * (nominal_.left.fy() + nominal_.right.fy());
+    const double sigma = std::max(options_.initial_sigma, 2 * typical_distance(rays) / focal);
+    covariance_ = Matrix<5>::Identity() * sigma * sigma;
+    const Vector<5> before = state_;
+    std::vector<double> sizes(rays.size());
+    for (int step = 0; step < 10; ++step) {
+      for (std::size_t i = 0; i < rays.size(); ++i) sizes[i] = std::abs(innovation(rays[i]).value);
+      const double scale = std::max(1.0, 1.4826 * median(sizes));
+      Matrix<5> information = Matrix<5>::Identity() / (sigma * sigma);
+      Vector<5> gradient = (before - state_) / (sigma * sigma);
+      for (const Rays& pair : rays) {
+        const Innovation z = innovation(pair);
+        const double weight = 1 / (1 + squared(z.value / scale));
+        information += weight * z.H * z.H.transpose();
+        gradient += weight * z.value * z.H;
+      }
+      state_ += information.llt().solve(gradient);
+    }
+  }
+
+  [[nodiscard]] double typical_distance(const std::vector<Rays>& rays) const {
+    if (rays.empty()) return 0;
+    const EpipolarConstraint constraint(corrected());
+    std::vector<double> distances;
+    distances.reserve(rays.size());
+    for (const Rays& pair : rays) distances.push_back(std::abs(constraint.distance(pair.left, pair.right)));
+    return 1.4826 * median(std::move(distances));
+  }
+
+  [[nodiscard]] static double squared(double value) noexcept { return value * value; }
+
+  StereoRig nominal_;
+  CalibrationDriftOptions options_;
+  Matrix<3> axes_;  // u1, u2, u3 of (1)
+  Vector<5> state_;
+  Matrix<5> covariance_;
+};
+
+}  // namespace cairn::inline CAIRN_ABI

@@ -1,0 +1,219 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The rigid motion between two sets of points of which some pairs are wrong, each point with its covariance.
+///
+/// LO-MSAC (ransac.hpp) over samples of three, closed form (alignment.hpp) for a sample, reweighted
+/// Gauss-Newton on the rest. A pair's residual r = T^-1 y - x, in the source frame, has covariance C = C_x +
+/// R^T C_y R and d r / d step = [-I, skew(T^-1 y)] for right steps of T_target_source. (1)
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <cairn/core/check.hpp>
+#include <cairn/core/linalg.hpp>
+#include <cairn/core/statistics.hpp>
+#include <cairn/geometry/alignment.hpp>
+#include <cairn/geometry/pose_equations.hpp>
+#include <cairn/geometry/ransac.hpp>
+#include <cairn/manifold/se3.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// The same point in two frames.
+struct PointMatch {
+  Vector<3> source = Vector<3>::Zero(), target = Vector<3>::Zero();
+  Matrix<3> source_covariance = Matrix<3>::Zero(), target_covariance = Matrix<3>::Identity();  ///< [m^2]
+};
+
+struct RobustAlignmentOptions {
+  RansacOptions ransac = {};
+  double gate_probability = 0.99;  ///< share of good pairs that pass the chi-square gate
+  RobustLoss loss = RobustLoss::cauchy;
+  double loss_scale = 3;        ///< in standard deviations of the whole residual
+  std::size_t min_inliers = 6;  ///< fewer: no consensus
+  double min_share = 0.1;       ///< of all pairs that must agree; below it agreement may be chance
+};
+
+enum class RobustAlignmentStatus { good, too_few_pairs, no_consensus, degenerate };
+
+/// Result. Unless good, the motion is the identity, and covariance and information are zero.
+struct RobustAlignment {
+  SE3 T_target_source;
+  Matrix<6> covariance = Matrix<6>::Zero();   ///< of a right step, translation then rotation
+  Matrix<6> information = Matrix<6>::Zero();  ///< its inverse
+  std::vector<std::uint8_t> inliers;          ///< 1 for each pair that agrees
+  std::size_t inlier_count = 0;
+  int iterations = 0;  ///< samples drawn
+  RobustAlignmentStatus status = RobustAlignmentStatus::too_few_pairs;
+  [[nodiscard]] bool good() const noexcept { return status == RobustAlignmentStatus::good; }
+};
+
+namespace detail {
+
+class RigidProblem {
+public:
+  using Model = SE3;
+  static constexpr std::size_t sample_size = 3;
+
+  RigidProblem(std::span<const PointMatch> pairs, const RobustAlignmentOptions& options)
+      : pairs_(pairs), options_(options), gate_(chi_square_quantile(options.gate_probability, 3)) {
+    for (std::size_t i = 0; i < pairs.size(); ++i)
+      if (!pairs[i].source.allFinite() || !pairs[i].target.allFinite() ||
+          !pairs[i].source_covariance.allFinite() || !pairs[i].target_covariance.allFinite())
+        raise("align_robustly: expected finite numbers, pair " + std::to_string(i) + " has others");
+  }
+
+  [[nodiscard]] std::size_t size() const noexcept { return pairs_.size(); }
+
+  [[nodiscard]] bool solve(std::span<const std::uint32_t> sample, SE3& motion) const {
+    Vector<3> source[sample_size], target[sample_size];
+    for (std::size_t k = 0; k < sample_size; ++k) {
+      source[k] = pairs_[sample[k]].source;
+      target[k] = pairs_[sample[k]].target;
+    }
+    const Alignment alignment = align_points(source, target, {}, {.tolerance = 1e-4});
+    motion = alignment.T_target_source;
+    return alignment.good();
+  }
+
+  [[nodiscard]] RansacScore score(const SE3& motion, double limit) const noexcept {
+    const Frame frame(motion);
+    RansacScore result{0, 0};
+    for (const PointMatch& pair : pairs_) {
+      const double chi_squared = Residual(pair, frame).chi_squared();
+      result.cost += std::min(gate_, chi_squared);
+      result.inliers += chi_squared < gate_;
+      if (result.cost > limit) break;
+    }
+    return result;
+  }
+
+  [[nodiscard]] bool refine(SE3& motion) const {
+    return step(motion, 9 * gate_).has_value() && step(motion, gate_).has_value();
+  }
+
+  void inliers(const SE3& motion, std::span<std::uint8_t> mask) const noexcept {
+    const Frame frame(motion);
+    for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = Residual(pairs_[i], frame).chi_squared() < gate_;
+  }
+
+  /// One reweighted Gauss-Newton step: its length in standard deviations, squared.
+  [[nodiscard]] std::optional<double> step(SE3& motion, double gate) const {
+    const auto [information, gradient] = linearise(motion, gate, options_.loss);
+    const auto factor = factor_information(information);
+    if (!factor) return std::nullopt;
+    const Vector<6> d = factor->solve(gradient);
+    motion = retract(motion, d);
+    return d.dot(gradient);
+  }
+  [[nodiscard]] std::optional<double> step(SE3& motion) const { return step(motion, gate_); }
+
+  [[nodiscard]] Matrix<6> information(const SE3& motion) const {
+    return linearise(motion, gate_, RobustLoss::none).information *
+           robust_efficiency(options_.loss, options_.loss_scale, options_.gate_probability, gate_, 3);
+  }
+
+private:
+  struct Equations {
+    Matrix<6> information = Matrix<6>::Zero();
+    Vector<6> gradient = Vector<6>::Zero();
+  };
+
+  struct Frame {
+    SE3 T_source_target;
+    Matrix<3> R_source_target;
+    explicit Frame(const SE3& motion)
+        : T_source_target(motion.inverse()), R_source_target(T_source_target.rotation().matrix()) {}
+  };
+
+  struct Residual {
+    Vector<3> q, r;  // T^-1 y; q - x
+    Matrix<3> weight;
+    Residual(const PointMatch& pair, const Frame& frame)
+        : q(frame.T_source_target * pair.target), r(q - pair.source) {
+      const Matrix<3> half = frame.R_source_target * pair.target_covariance;
+      const Matrix<3> C = pair.source_covariance + half * frame.R_source_target.transpose();
+      const Eigen::LLT<Matrix<3>> factor(C);
+      weight = factor.info() == Eigen::Success ? Matrix<3>(factor.solve(Matrix<3>::Identity()))
+                                               : Matrix<3>::Zero();
+      usable = factor.info() == Eigen::Success;
+    }
+    [[nodiscard]] double chi_squared() const noexcept {
+      return usable ? r.dot(weight * r) : std::numeric_limits<double>::infinity();
+    }
+    bool usable;  // false where the covariance is not positive definite: nothing can be said
+  };
+
+  [[nodiscard]] Equations linearise(const SE3& motion, double gate, RobustLoss loss) const {
+    const Frame frame(motion);
+    Equations e;
+    for (const PointMatch& pair : pairs_) {
+      const Residual residual(pair, frame);
+      const double chi_squared = residual.chi_squared();
+      if (!(chi_squared < gate)) continue;
+      const double w = robust_weight(loss, options_.loss_scale, chi_squared);
+      Matrix<3, 6> J;  // (1)
+      J << -Matrix<3>::Identity(), skew(residual.q);
+      const Matrix<6, 3> JW = w * (J.transpose() * residual.weight);
+      e.information += JW * J;
+      e.gradient -= JW * residual.r;
+    }
+    e.information = symmetrised(e.information);
+    return e;
+  }
+
+  std::span<const PointMatch> pairs_;
+  RobustAlignmentOptions options_;
+  double gate_;
+};
+
+}  // namespace detail
+
+/// The motion that most pairs agree with, refined on those. Throws Error, naming the pair, where a number is
+/// not finite. Deterministic in its arguments.
+[[nodiscard]] inline RobustAlignment align_robustly(std::span<const PointMatch> pairs,
+                                                    const RobustAlignmentOptions& options = {}) {
+  const detail::RigidProblem problem(pairs, options);
+  RobustAlignment result;
+  result.inliers.assign(pairs.size(), 0);
+  if (pairs.size() < std::max(options.min_inliers, detail::RigidProblem::sample_size)) return result;
+  const auto best = ransac(problem, options.ransac);
+  result.iterations = best.iterations;
+  result.status = RobustAlignmentStatus::no_consensus;
+  if (!best.model || !detail::enough_inliers(best.score.inliers, pairs.size(), options)) return result;
+  SE3 motion = *best.model;
+  result.status = RobustAlignmentStatus::degenerate;
+  constexpr int most_steps = 15;
+  for (int i = 0; i < most_steps; ++i) {
+    const auto length = problem.step(motion);
+    if (!length) return result;
+    if (*length < 1e-6) break;
+  }
+  const Matrix<6> information = problem.information(motion);
+  const auto factor = detail::factor_information(information);
+  if (!factor) return result;
+  const RansacScore score = problem.score(motion, std::numeric_limits<double>::infinity());
+  result.status = !detail::enough_inliers(score.inliers, pairs.size(), options)
+                      ? RobustAlignmentStatus::no_consensus
+                      : RobustAlignmentStatus::good;
+  if (!result.good()) return result;
+  result.T_target_source = motion;
+  result.information = information;
+  result.covariance = symmetrised(factor->solve(Matrix<6>::Identity()));
+  result.inlier_count = score.inliers;
+  problem.inliers(motion, result.inliers);
+  return result;
+}
+
+}  // namespace cairn::inline CAIRN_ABI

@@ -1,0 +1,146 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// Search with a bounded amount of work: leaves in the order of their cells' distance from the query, until a
+/// budget of leaves is spent (Beis and Lowe, "Shape indexing using approximate nearest-neighbour search in
+/// high-dimensional spaces", CVPR 1997).
+///
+/// Several trees share one queue, one budget and one collector, so p trees do not cost p searches. With
+/// enough budget the answer is exact: a queued cell's bound is its true distance, kept up to date as in Arya
+/// and Mount by looking up how far the cell already was along the split's axis.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include <cairn/index/kd_tree.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// How many leaves (of up to 16 points) a search may scan.
+struct Budget {
+  std::size_t leaves = std::numeric_limits<std::size_t>::max();
+};
+
+/// Best-bin-first search over trees of one kind. Holds the queue, so keep one for many searches; one a
+/// thread.
+template <class Tree>
+class BestBinFirst {
+public:
+  using Real = typename Tree::Real;
+
+  /// Offers points of all `trees` (null ones are skipped) to the collector, until nothing nearer can be left
+  /// or the budget is spent. `query` holds dimension() finite numbers. Returns true where the answer is
+  /// exact.
+  template <Collector<Real> C>
+  bool search(std::span<const Tree* const> trees, const Real* query, C& collector, Budget budget = {},
+              Work* work = nullptr) {
+    queue_.clear();
+    turns_.clear();
+    Work done;
+    std::size_t leaves = 0;
+    for (std::size_t i = 0; i < trees.size(); ++i)
+      if (trees[i] != nullptr && !trees[i]->empty()) push({0, static_cast<std::uint32_t>(i), 0, 0, no_turn});
+    Real rest = std::numeric_limits<Real>::infinity();  // how near an unvisited cell may be
+    Leaf waiting;  // scanned only after the next one has been asked for, so that memory is not waited for
+    while (!queue_.empty()) {
+      const Cell cell = pop();
+      if (!(cell.bound < static_cast<Real>(collector.limit()))) break;
+      if (leaves == budget.leaves) {
+        rest = cell.bound;
+        break;
+      }
+      ++leaves;
+      const Leaf next{trees[cell.tree], descend(*trees[cell.tree], cell, query, collector, done)};
+      next.tree->prefetch_leaf(next.leaf);
+      if (waiting.tree != nullptr) waiting.tree->scan_leaf(waiting.leaf, query, collector, done);
+      waiting = next;
+    }
+    if (waiting.tree != nullptr) waiting.tree->scan_leaf(waiting.leaf, query, collector, done);
+    if (work != nullptr) *work += done;
+    return !(rest < static_cast<Real>(collector.limit()));
+  }
+
+  /// The same for one tree and any kind of query point, which is checked.
+  template <Point Query, Collector<Real> C>
+  bool search(const Tree& tree, const Query& query, C& collector, Budget budget = {}, Work* work = nullptr) {
+    if (tree.empty()) return true;
+    row_.resize(tree.dimension());
+    detail::copy_point<Real>(query, row_.size(), row_.data(), {"BestBinFirst: query", 0});
+    const Tree* const trees[] = {&tree};
+    return search(std::span<const Tree* const>(trees), row_.data(), collector, budget, work);
+  }
+
+private:
+  static constexpr std::uint32_t no_turn = 0xffffffffU;
+
+  /// A subtree not yet visited: its lower bound (reduced), and the last turn away from the query above it.
+  struct Cell {
+    Real bound;
+    std::uint32_t tree;
+    std::uint32_t depth;
+    std::uint32_t slot;
+    std::uint32_t turn;
+  };
+  struct Leaf {
+    const Tree* tree = nullptr;
+    std::size_t leaf = 0;
+  };
+  /// The path to a cell left the query's side of a split here; `offset` is how far that side is.
+  struct Turn {
+    Real offset;
+    std::uint32_t axis;
+    std::uint32_t before;
+  };
+
+  void push(const Cell& cell) {
+    queue_.push_back(cell);
+    std::push_heap(queue_.begin(), queue_.end(), farther);
+  }
+  Cell pop() {
+    std::pop_heap(queue_.begin(), queue_.end(), farther);
+    const Cell cell = queue_.back();
+    queue_.pop_back();
+    return cell;
+  }
+  static bool farther(const Cell& a, const Cell& b) noexcept { return a.bound > b.bound; }
+
+  /// From a cell down to the leaf on the query's side of every split, whose number is returned; the other
+  /// sides are queued.
+  template <class C>
+  std::size_t descend(const Tree& tree, Cell cell, const Real* query, const C& collector, Work& work) {
+    for (;; ++cell.depth) {
+      const detail::Range leaves = tree.layout().leaves_below(cell.depth, cell.slot);
+      if (leaves.size() == 1) return leaves.begin;
+      ++work.nodes;
+      const auto& split = tree.split(cell.depth, cell.slot);
+      const Real offset = query[split.axis] - static_cast<Real>(split.value);
+      const std::uint32_t near = 2 * cell.slot + (offset < 0 ? 0U : 1U);
+      const Real old = offset_along(split.axis, cell.turn);
+      const Real bound = detail::moved_bound(tree.metric(), cell.bound, old, offset, split.axis);
+      if (bound < static_cast<Real>(collector.limit())) {
+        turns_.push_back({offset, split.axis, cell.turn});
+        push({bound, cell.tree, cell.depth + 1, near ^ 1U, static_cast<std::uint32_t>(turns_.size() - 1)});
+      }
+      cell.slot = near;
+    }
+  }
+
+  /// How far the current cell is from the query along an axis: the last turn on that axis, 0 without one.
+  [[nodiscard]] Real offset_along(std::uint32_t axis, std::uint32_t turn) const noexcept {
+    for (; turn != no_turn; turn = turns_[turn].before)
+      if (turns_[turn].axis == axis) return turns_[turn].offset;
+    return 0;
+  }
+
+  std::vector<Cell> queue_;
+  std::vector<Turn> turns_;
+  std::vector<Real> row_;
+};
+
+}  // namespace cairn::inline CAIRN_ABI

@@ -1,0 +1,81 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// All points of a kd-tree inside an axis-parallel box, bounds included.
+#pragma once
+
+#include <cstddef>
+#include <type_traits>
+#include <vector>
+
+#include <cairn/index/kd_tree.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+namespace detail {
+
+template <class Tree, class Visit>
+class BoxQuery {
+public:
+  using Real = typename Tree::Real;
+
+  BoxQuery(const Tree& tree, const Real* low, const Real* high, Visit& visit)
+      : tree_(tree), low_(low), high_(high), visit_(visit) {}
+
+  void descend(unsigned depth, std::size_t slot) const {
+    const Range leaves = tree_.layout().leaves_below(depth, slot);
+    if (leaves.size() == 1) return scan(leaves.begin);
+    const auto& split = tree_.split(depth, slot);
+    const auto value = static_cast<Real>(split.value);
+    if (low_[split.axis] <= value) descend(depth + 1, 2 * slot);
+    if (high_[split.axis] >= value) descend(depth + 1, 2 * slot + 1);
+  }
+
+private:
+  void scan(std::size_t leaf) const {
+    const auto* block = tree_.blocks().block(leaf);
+    const PointId* ids = tree_.blocks().ids(leaf);
+    for (std::size_t lane = 0; lane < block_size && ids[lane] != no_point; ++lane) {
+      bool inside = true;
+      for (std::size_t a = 0; inside && a < tree_.dimension(); ++a) {
+        const auto number = static_cast<Real>(block[a * block_size + lane]);
+        inside = low_[a] <= number && number <= high_[a];
+      }
+      if (inside) visit_(ids[lane]);
+    }
+  }
+
+  const Tree& tree_;
+  const Real* low_;
+  const Real* high_;
+  Visit& visit_;
+};
+
+}  // namespace detail
+
+/// Calls visit(id) for every point p of the tree with low[a] <= p[a] <= high[a] for all axes a, in leaf
+/// order. Throws Error for corners that are not finite or have another dimension; a box whose low is above
+/// its high holds nothing. O(n^(1 - 1/dim) + found).
+template <class Scalar, std::size_t Dim, class M, Point Low, Point High, class Visit>
+void visit_inside(const KdTree<Scalar, Dim, M>& tree, const Low& low, const High& high, Visit&& visit) {
+  using Tree = KdTree<Scalar, Dim, M>;
+  if (tree.empty()) return;
+  std::vector<typename Tree::Real> corners(2 * tree.dimension());
+  detail::copy_point(low, tree.dimension(), corners.data(), {"visit_inside: corner", 0});
+  detail::copy_point(high, tree.dimension(), corners.data() + tree.dimension(), {"visit_inside: corner", 1});
+  detail::BoxQuery<Tree, std::remove_reference_t<Visit>> query(tree, corners.data(),
+                                                               corners.data() + tree.dimension(), visit);
+  query.descend(0, 0);
+}
+
+/// Their ids.
+template <class Scalar, std::size_t Dim, class M, Point Low, Point High>
+[[nodiscard]] std::vector<PointId> inside(const KdTree<Scalar, Dim, M>& tree, const Low& low,
+                                          const High& high) {
+  std::vector<PointId> found;
+  visit_inside(tree, low, high, [&](PointId id) { found.push_back(id); });
+  return found;
+}
+
+}  // namespace cairn::inline CAIRN_ABI

@@ -1,0 +1,196 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The upper part of a tree of few dimensions for exact search: nodes of up to sixteen children, each with
+/// the bounding box of its points, so that four levels of splits cost one pass of vector code.
+///
+/// The levels of the binary tree are taken four at a time from the leaves up; the root takes what remains.
+/// Node j of level w has its children at f j, ..., f j + f - 1 of the level below (f: fan-out of the level),
+/// so there are no pointers. A search keeps, for every level on its path, the sixteen lower bounds of the
+/// children not yet visited, each with the child's number in its last four bits, and always descends to the
+/// nearest.
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+
+#include <cairn/index/leaf_blocks.hpp>
+
+namespace cairn::inline CAIRN_ABI::detail {
+
+template <class Scalar>
+class BoxTree {
+public:
+  using Real = RealOf<Scalar>;
+  using Bits = BitsOf<Real>;
+
+  BoxTree() = default;
+
+  BoxTree(const LeafBlocks<Scalar>& blocks, std::size_t dim, const KdLayout& layout)
+      : layout_(layout), dim_(dim) {
+    levels_ = (layout.depth() + 3) / 4;
+    std::size_t nodes = 0;
+    for (unsigned level = 0; level < levels_; ++level) {
+      first_node_[level] = nodes;
+      nodes += nodes_at(level);
+    }
+    boxes_.resize(nodes * node_size());
+    if (levels_ == 0) return;
+    for (std::size_t node = nodes_at(levels_ - 1); node-- > 0;) fill_last(blocks, node);
+    for (unsigned level = levels_ - 1; level-- > 0;)
+      for (std::size_t node = 0; node < nodes_at(level); ++node) fill_inner(level, node);
+  }
+
+  [[nodiscard]] std::size_t bytes() const noexcept { return boxes_.capacity() * sizeof(Real); }
+
+  /// Offers all points nearer than the collector's limit, nearest boxes first. `dim` is the tree's, given
+  /// again so that it may be a constant.
+  template <class M, class C>
+  [[gnu::always_inline]] void search(const LeafBlocks<Scalar>& blocks, const Real* query, std::size_t dim,
+                                     const M& metric, C& collector, Work& work) const {
+    if (levels_ == 0) {
+      if (layout_.leaves() > 0) scan(blocks, 0, query, dim, metric, collector, work);
+      return;
+    }
+    Block<Bits> waiting[max_levels];
+    std::size_t node_of[max_levels];
+    unsigned level = 0;
+    node_of[0] = 0;
+    bound_children(0, 0, query, dim, metric, collector, waiting[0], work);
+    for (;;) {
+      const Bits best = smallest<Bits>(waiting[level]);
+      if (!(bound_of(best) < static_cast<Real>(collector.limit()))) {
+        if (level == 0) return;
+        --level;
+        continue;
+      }
+      const auto lane = static_cast<std::size_t>(best & 15);
+      waiting[level][lane] = none;
+      const std::size_t child = (node_of[level] << fan_bits(level)) + lane;
+      if (level + 1 == levels_) {
+        scan(blocks, (child * layout_.leaves()) >> layout_.depth(), query, dim, metric, collector, work);
+      } else {
+        node_of[++level] = child;
+        bound_children(level, child, query, dim, metric, collector, waiting[level], work);
+      }
+    }
+  }
+
+private:
+  static constexpr unsigned max_levels = 8;  // 16^8 leaves of 16 points are more than 2^32
+  static constexpr Bits none = std::numeric_limits<Bits>::max();
+
+  [[nodiscard]] std::size_t node_size() const noexcept { return 2 * dim_ * block_size; }
+  [[nodiscard]] unsigned root_bits() const noexcept { return layout_.depth() - 4 * (levels_ - 1); }
+  [[nodiscard]] unsigned fan_bits(unsigned level) const noexcept { return level == 0 ? root_bits() : 4; }
+  /// Depth in the binary tree of the nodes of a level.
+  [[nodiscard]] unsigned depth_of(unsigned level) const noexcept {
+    return level == 0 ? 0 : root_bits() + 4 * (level - 1);
+  }
+  [[nodiscard]] std::size_t nodes_at(unsigned level) const noexcept {
+    return std::size_t{1} << depth_of(level);
+  }
+  [[nodiscard]] Real* box(unsigned level, std::size_t node) noexcept {
+    return boxes_.data() + (first_node_[level] + node) * node_size();
+  }
+  [[nodiscard]] const Real* box(unsigned level, std::size_t node) const noexcept {
+    return boxes_.data() + (first_node_[level] + node) * (2 * dim_ * block_size);
+  }
+
+  /// A key's lower bound: its number without the child in the last four bits. NaN stands for `none`.
+  [[gnu::always_inline]] static Real bound_of(Bits key) noexcept {
+    return std::bit_cast<Real>(key & ~Bits{15});
+  }
+
+  template <class M, class C>
+  [[gnu::always_inline]] static void scan(const LeafBlocks<Scalar>& blocks, std::size_t leaf,
+                                          const Real* query, std::size_t dim, const M& metric, C& collector,
+                                          Work& work) {
+    ++work.leaves;
+    work.distances += block_size;
+    blocks.scan(leaf, query, dim, metric, collector);
+  }
+
+  /// Lower bounds of the children of a node that may hold something near enough, as keys.
+  template <class M, class C>
+  [[gnu::always_inline]] void bound_children(unsigned level, std::size_t node, const Real* query,
+                                             std::size_t dim, const M& metric, const C& collector,
+                                             Block<Bits>& keys, Work& work) const {
+    ++work.nodes;
+    const Real* low = boxes_.data() + (first_node_[level] + node) * (2 * dim * block_size);
+    Block<Real> sums{};
+    for (std::size_t a = 0; a < dim; ++a) {
+      Block<Real> under;
+      Block<Real> over;
+      load_block<Real>(low + 2 * a * block_size, under);
+      load_block<Real>(low + (2 * a + 1) * block_size, over);
+      under = under - query[a];
+      over = query[a] - over;
+      Block<Real> gap = under < over ? over : under;
+      gap = gap < 0 ? Block<Real>{} : gap;
+      accumulate_block<Real>(metric, sums, gap, a);
+    }
+    const Real limit = static_cast<Real>(collector.limit());
+    Block<Bits> bits;
+    std::memcpy(&bits, &sums, sizeof(bits));
+    const Block<Bits> children = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15};
+    keys = sums < limit ? ((bits & ~Bits{15}) | children) : (Block<Bits>{} + none);
+  }
+
+  /// The children of the last level's nodes are leaves, or nothing where the last depth has no leaf.
+  void fill_last(const LeafBlocks<Scalar>& blocks, std::size_t node) {
+    Real* boxes = box(levels_ - 1, node);
+    for (std::size_t lane = 0; lane < block_size; ++lane) {
+      const std::size_t slot = (node << fan_bits(levels_ - 1)) + lane;
+      const bool inside = lane < (std::size_t{1} << fan_bits(levels_ - 1));
+      const Range leaves = inside ? layout_.leaves_below(layout_.depth(), slot) : Range{0, 0};
+      for (std::size_t a = 0; a < dim_; ++a) {
+        Real low = std::numeric_limits<Real>::infinity();
+        Real high = -low;
+        if (leaves.size() > 0) {
+          const Scalar* numbers = blocks.block(leaves.begin) + a * block_size;
+          for (std::size_t i = 0; i < block_size; ++i) {
+            const auto number = static_cast<Real>(numbers[i]);
+            low = number < low ? number : low;
+            high = high < number ? number : high;
+          }
+        }
+        boxes[2 * a * block_size + lane] = low;
+        boxes[(2 * a + 1) * block_size + lane] = high;
+      }
+    }
+  }
+
+  /// A child's box holds the boxes of its own children.
+  void fill_inner(unsigned level, std::size_t node) {
+    Real* boxes = box(level, node);
+    for (std::size_t lane = 0; lane < block_size; ++lane) {
+      const std::size_t child = (node << fan_bits(level)) + lane;
+      const bool inside = lane < (std::size_t{1} << fan_bits(level));
+      for (std::size_t a = 0; a < dim_; ++a) {
+        Real low = std::numeric_limits<Real>::infinity();
+        Real high = -low;
+        for (std::size_t i = 0; inside && i < block_size; ++i) {
+          const Real* inner = box(level + 1, child) + 2 * a * block_size;
+          low = inner[i] < low ? inner[i] : low;
+          high = high < inner[block_size + i] ? inner[block_size + i] : high;
+        }
+        boxes[2 * a * block_size + lane] = low;
+        boxes[(2 * a + 1) * block_size + lane] = high;
+      }
+    }
+  }
+
+  KdLayout layout_;
+  std::size_t dim_ = 0;
+  unsigned levels_ = 0;
+  std::array<std::size_t, max_levels> first_node_{};
+  AlignedVector<Real> boxes_;
+};
+
+}  // namespace cairn::inline CAIRN_ABI::detail

@@ -1,0 +1,213 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// A static balanced kd-tree, built once, that owns its points in leaf order.
+///
+///   KdTree<float, 3> tree(points);                     // any PointSet
+///   if (auto hit = tree.nearest(query)) use(hit->id, hit->distance);
+///   for (auto [id, distance] : tree.nearest(query, 10)) ...
+///   for (auto [id, distance] : tree.within(query, 0.5f)) ...
+///   tree.search(query, my_collector);
+///
+/// Up to eight dimensions exact search runs over nodes of sixteen boxes (box_tree.hpp); above, over single
+/// splits with the distance to the cell kept up to date (Arya and Mount, "Algorithms for fast vector
+/// quantization", DCC 1993); for a budget instead of exactness see best_bin_first.hpp. Ids are the positions
+/// of the points in the set, or the caller's own. Depth is ceil(log2(n / 16)) whatever the points.
+/// Const methods may run at the same time. Searching allocates nothing up to 160 dimensions.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <cairn/core/check.hpp>
+#include <cairn/index/box_tree.hpp>
+#include <cairn/index/kd_build.hpp>
+#include <cairn/index/kd_layout.hpp>
+#include <cairn/index/leaf_blocks.hpp>
+#include <cairn/index/metric.hpp>
+#include <cairn/index/neighbors.hpp>
+#include <cairn/index/points.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// Scalar: float, double or std::uint8_t coordinates. Dim: number of coordinates, or dynamic_dim. Distances
+/// are float, for double coordinates double.
+template <class Scalar = float, std::size_t Dim = dynamic_dim, class M = L2>
+class KdTree {
+public:
+  using Real = detail::RealOf<Scalar>;
+  using Hit = Neighbor<Real>;
+  using Coordinate = Scalar;
+  static constexpr std::size_t fixed_dimension = Dim;
+  static_assert(Metric<M, Real>, "the third argument of KdTree must satisfy cairn::Metric");
+
+  /// A tree of nothing: every search comes back empty.
+  KdTree() = default;
+
+  /// Builds from a set of points, ids 0 ... n - 1. Throws Error, naming the point, for a coordinate that is
+  /// not finite (or so large that squares overflow) and for points of different dimensions. O(n log n).
+  template <PointSet Points>
+  explicit KdTree(const Points& points, M metric = {})
+      : KdTree(detail::copy_points<Scalar>(points, detail::dimension_of<Dim>(points), "KdTree: point"), {},
+               detail::dimension_of<Dim>(points), std::move(metric)) {}
+
+  /// The same with the caller's ids, one a point, none of them no_point.
+  template <PointSet Points>
+  KdTree(const Points& points, std::span<const PointId> ids, M metric = {})
+      : KdTree(detail::copy_points<Scalar>(points, detail::dimension_of<Dim>(points), "KdTree: point"), ids,
+               detail::dimension_of<Dim>(points), std::move(metric)) {
+    CAIRN_EXPECTS(ids.size() == size(), "KdTree: there must be one id a point");
+  }
+
+  /// The same from rows of `dim` numbers that are known to be finite; ids as above, or empty for 0 ... n - 1.
+  [[nodiscard]] static KdTree from_rows(const std::vector<Scalar>& rows, std::size_t dim,
+                                        std::span<const PointId> ids = {}, M metric = {}) {
+    CAIRN_EXPECTS(Dim == dynamic_dim || dim == Dim, "KdTree::from_rows: the dimension is fixed by the type");
+    CAIRN_EXPECTS(ids.empty() || ids.size() * dim == rows.size(), "KdTree: there must be one id a point");
+    return KdTree(rows, ids, dim, std::move(metric));
+  }
+
+  [[nodiscard]] std::size_t size() const noexcept { return layout_.points(); }
+  [[nodiscard]] bool empty() const noexcept { return size() == 0; }
+  [[nodiscard]] std::size_t dimension() const noexcept { return Dim != dynamic_dim ? Dim : dim_; }
+  [[nodiscard]] std::size_t leaves() const noexcept { return layout_.leaves(); }
+  [[nodiscard]] unsigned depth() const noexcept { return layout_.depth(); }
+  [[nodiscard]] const M& metric() const noexcept { return metric_; }
+  /// Memory held, the points included.
+  [[nodiscard]] std::size_t bytes() const noexcept {
+    return blocks_.bytes() + boxes_.bytes() + splits_.capacity() * sizeof(detail::Split<Scalar>);
+  }
+
+  /// The nearest point; nothing where the tree is empty.
+  template <Point Query>
+  [[nodiscard]] std::optional<Hit> nearest(const Query& query) const {
+    Nearest<Real> collector;
+    search(query, collector);
+    if (collector.id() == no_point) return std::nullopt;
+    return Hit{collector.id(), metric_.restore(collector.reduced())};
+  }
+
+  /// The k nearest points, nearest first; all of them where there are fewer. O(k) for each point kept.
+  template <Point Query>
+  [[nodiscard]] std::vector<Hit> nearest(const Query& query, std::size_t k) const {
+    std::vector<Hit> found(std::min(k, size()));
+    found.resize(nearest(query, std::span<Hit>(found)));
+    return found;
+  }
+
+  /// Writes the nearest points, nearest first, as many as `found` has room for; returns how many.
+  template <Point Query>
+  std::size_t nearest(const Query& query, std::span<Hit> found) const {
+    if (found.empty()) return 0;
+    KNearest<Real> collector(found.data(), found.size());
+    search(query, collector);
+    collector.restore(metric_);
+    return collector.size();
+  }
+
+  /// All points at most `radius` away, nearest first. radius >= 0.
+  template <Point Query>
+  [[nodiscard]] std::vector<Hit> within(const Query& query, Real radius) const {
+    CAIRN_EXPECTS(radius >= 0, "KdTree::within: a radius is not negative");
+    std::vector<Hit> found;
+    Within<Real> collector(found, metric_.reduce(radius));
+    search(query, collector);
+    for (Hit& hit : found) hit.distance = metric_.restore(hit.distance);
+    std::sort(found.begin(), found.end(), nearer<Real>);
+    return found;
+  }
+
+  /// Shows a collector every point nearer than its limit (and perhaps others), near ones early. Adds to
+  /// `work` what was done. Throws Error where a coordinate of the query is not finite.
+  template <Point Query, Collector<Real> C>
+  void search(const Query& query, C& collector, Work* work = nullptr) const {
+    if (empty()) return;
+    detail::Scratch<Real> row(dimension());
+    detail::copy_point<Real>(query, dimension(), row.data(), {"KdTree: query", 0});
+    Work done;
+    if (use_boxes())
+      detail::with_widest_lanes(
+          [&]() CAIRN_INLINED { boxes_.search(blocks_, row.data(), dimension(), metric_, collector, done); });
+    else
+      search_splits(row.data(), collector, done);
+    if (work != nullptr) *work += done;
+  }
+
+  /// Calls visit(id, std::span<const Scalar>) for every point, in leaf order.
+  template <class Visit>
+  void for_each(Visit&& visit) const {
+    blocks_.for_each(visit);
+  }
+
+  /// For searches of other headers: the shape, the splits, and one leaf's points offered to a collector.
+  [[nodiscard]] const detail::KdLayout& layout() const noexcept { return layout_; }
+  [[nodiscard]] const detail::Split<Scalar>& split(unsigned depth, std::size_t slot) const noexcept {
+    return splits_[detail::KdLayout::split_at(depth, slot)];
+  }
+  [[nodiscard]] const detail::LeafBlocks<Scalar>& blocks() const noexcept { return blocks_; }
+  void prefetch_leaf(std::size_t leaf) const noexcept { blocks_.prefetch(leaf); }
+  template <Collector<Real> C>
+  void scan_leaf(std::size_t leaf, const Real* query, C& collector, Work& work) const {
+    ++work.leaves;
+    work.distances += detail::block_size;
+    detail::with_widest_lanes(
+        [&]() CAIRN_INLINED { blocks_.scan(leaf, query, dimension(), metric_, collector); });
+  }
+
+private:
+  KdTree(const std::vector<Scalar>& rows, std::span<const PointId> ids, std::size_t dim, M metric)
+      : metric_(std::move(metric)), dim_(dim), layout_(dim == 0 ? 0 : rows.size() / dim) {
+    if (layout_.points() == 0) return;
+    detail::PointsToSplit<Scalar, Dim> ordered(rows, dimension());
+    splits_.resize(layout_.splits());
+    detail::split_all(ordered, layout_, splits_);
+    blocks_ = detail::LeafBlocks<Scalar>(ordered, dimension(), layout_, ids.data());
+    if (use_boxes()) boxes_ = detail::BoxTree<Scalar>(blocks_, dimension(), layout_);
+  }
+
+  [[nodiscard]] bool use_boxes() const noexcept { return dimension() <= detail::few_axes; }
+
+  /// Depth first over single splits; `offsets` holds the distance to the current cell along each axis.
+  template <class C>
+  void search_splits(const Real* query, C& collector, Work& work) const {
+    detail::Scratch<Real> offsets(dimension());
+    std::fill_n(offsets.data(), dimension(), Real{0});
+    descend(0, 0, Real{0}, query, offsets.data(), collector, work);
+  }
+
+  template <class C>
+  void descend(unsigned depth, std::size_t slot, Real bound, const Real* query, Real* offsets, C& collector,
+               Work& work) const {
+    const detail::Range leaves = layout_.leaves_below(depth, slot);
+    if (leaves.size() == 1) return scan_leaf(leaves.begin, query, collector, work);
+    ++work.nodes;
+    const detail::Split<Scalar>& here = split(depth, slot);
+    const Real offset = query[here.axis] - static_cast<Real>(here.value);
+    const std::size_t near = 2 * slot + (offset < 0 ? 0 : 1);
+    descend(depth + 1, near, bound, query, offsets, collector, work);
+    const Real old = offsets[here.axis];
+    const Real far_bound = detail::moved_bound(metric_, bound, old, offset, here.axis);
+    if (!(far_bound < static_cast<Real>(collector.limit()))) return;
+    offsets[here.axis] = offset;
+    descend(depth + 1, near ^ 1U, far_bound, query, offsets, collector, work);
+    offsets[here.axis] = old;
+  }
+
+  [[no_unique_address]] M metric_{};
+  std::size_t dim_ = 0;
+  detail::KdLayout layout_;
+  detail::LeafBlocks<Scalar> blocks_;
+  std::vector<detail::Split<Scalar>> splits_;
+  detail::BoxTree<Scalar> boxes_;
+};
+
+}  // namespace cairn::inline CAIRN_ABI

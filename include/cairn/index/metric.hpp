@@ -1,0 +1,154 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// How far two points are: a sum (or maximum) over the coordinates, and a last step that makes it a distance.
+///
+///   distance(p, q) = restore( accumulate over axes of |p[a] - q[a]| )
+///
+/// What is accumulated is the *reduced* distance (for L2 the squared one); searches compare reduced
+/// distances, callers only ever see true ones. Laws, for every metric: restore(reduce(d)) = d for d >= 0,
+/// both grow with their argument, accumulating grows with |difference|, and true distances obey the triangle
+/// inequality.
+///
+/// A metric whose sum is not a sum but a maximum says so: static constexpr bool additive = false.
+///
+/// accumulate() is a template over the number type so that one line serves single numbers and sixteen lanes
+/// alike: write it with +, *, comparisons and ?:.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <limits>
+
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// What a search needs to know of a distance. `difference` is a coordinate of the query minus that of a
+/// point, `axis` its number.
+template <class M, class Number = float>
+concept Metric = std::copy_constructible<M> &&
+                 requires(const M& metric, Number sum, const Number difference, std::size_t axis) {
+                   metric.accumulate(sum, difference, axis);
+                   { metric.restore(sum) } noexcept -> std::convertible_to<Number>;
+                   { metric.reduce(sum) } noexcept -> std::convertible_to<Number>;
+                 };
+
+/// Euclidean distance, in the units of the coordinates; reduced: its square.
+struct L2 {
+  template <class Number>
+  [[gnu::always_inline]] static void accumulate(Number& sum, const Number& difference, std::size_t) noexcept {
+    sum = sum + difference * difference;
+  }
+  template <std::floating_point Real>
+  [[nodiscard]] static Real restore(Real reduced) noexcept {
+    return std::sqrt(reduced);
+  }
+  template <std::floating_point Real>
+  [[nodiscard]] static Real reduce(Real distance) noexcept {
+    return distance * distance;
+  }
+};
+
+/// Sum of the absolute differences.
+struct L1 {
+  template <class Number>
+  [[gnu::always_inline]] static void accumulate(Number& sum, const Number& difference, std::size_t) noexcept {
+    sum = sum + (difference < 0 ? -difference : difference);
+  }
+  template <std::floating_point Real>
+  [[nodiscard]] static Real restore(Real reduced) noexcept {
+    return reduced;
+  }
+  template <std::floating_point Real>
+  [[nodiscard]] static Real reduce(Real distance) noexcept {
+    return distance;
+  }
+};
+
+/// Largest absolute difference.
+struct LInfinity {
+  static constexpr bool additive = false;
+
+  template <class Number>
+  [[gnu::always_inline]] static void accumulate(Number& sum, const Number& difference, std::size_t) noexcept {
+    const Number size = difference < 0 ? -difference : difference;
+    sum = sum < size ? size : sum;
+  }
+  template <std::floating_point Real>
+  [[nodiscard]] static Real restore(Real reduced) noexcept {
+    return reduced;
+  }
+  template <std::floating_point Real>
+  [[nodiscard]] static Real reduce(Real distance) noexcept {
+    return distance;
+  }
+};
+
+/// Angle [rad] between unit vectors; reduced: the squared chord, (2 sin(angle / 2))^2. The points and queries
+/// must have length one: the metric does not normalise them.
+struct Angular {
+  template <class Number>
+  [[gnu::always_inline]] static void accumulate(Number& sum, const Number& difference, std::size_t) noexcept {
+    sum = sum + difference * difference;
+  }
+  template <std::floating_point Real>
+  [[nodiscard]] static Real restore(Real reduced) noexcept {
+    const Real half_chord = std::sqrt(reduced) / 2;
+    return 2 * std::asin(half_chord < 1 ? half_chord : Real{1});
+  }
+  template <std::floating_point Real>
+  [[nodiscard]] static Real reduce(Real angle) noexcept {
+    const Real half = angle / 2;
+    if (half >= std::asin(Real{1})) return std::numeric_limits<Real>::max();  // every direction is that near
+    const Real chord = 2 * std::sin(half);
+    return chord * chord;
+  }
+};
+
+/// Euclidean distance with a weight for each axis: sqrt(sum of (weight[a] * difference[a])^2). Weights >= 0,
+/// finite.
+template <std::size_t Dim, std::floating_point Real = float>
+struct WeightedL2 {
+  std::array<Real, Dim> weight;
+
+  template <class Number>
+  [[gnu::always_inline]] void accumulate(Number& sum, const Number& difference,
+                                         std::size_t axis) const noexcept {
+    const Number scaled = difference * weight[axis];
+    sum = sum + scaled * scaled;
+  }
+  template <std::floating_point R>
+  [[nodiscard]] static R restore(R reduced) noexcept {
+    return std::sqrt(reduced);
+  }
+  template <std::floating_point R>
+  [[nodiscard]] static R reduce(R distance) noexcept {
+    return distance * distance;
+  }
+};
+
+namespace detail {
+
+/// Lower bound of the distance to a cell after its nearest side on one axis moved from `old` to `offset`
+/// away from the query (both as differences, |offset| >= |old|).
+template <class M, class Real>
+[[nodiscard]] Real moved_bound(const M& metric, Real bound, Real old, Real offset,
+                               std::size_t axis) noexcept {
+  Real after = 0;
+  metric.accumulate(after, offset, axis);
+  if constexpr (requires { requires !M::additive; }) {
+    return bound < after ? after : bound;
+  } else {
+    Real before = 0;
+    metric.accumulate(before, old, axis);
+    return bound + (after - before);
+  }
+}
+
+}  // namespace detail
+
+}  // namespace cairn::inline CAIRN_ABI

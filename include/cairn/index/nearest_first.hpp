@@ -1,0 +1,115 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The points of a kd-tree one after the other, nearest first, for callers who do not know beforehand how
+/// many they need (Hjaltason and Samet, "Distance browsing in spatial databases", ACM TODS 24, 1999).
+///
+///   NearestFirst order(tree, query);
+///   while (auto hit = order.next()) if (suits(hit->id)) break;
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <cairn/index/kd_tree.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// Refers to the tree, which must live longer. The k-th call costs as much as it takes to be sure of the k-th
+/// nearest; memory grows with the leaves visited.
+template <class Tree>
+class NearestFirst {
+public:
+  using Real = typename Tree::Real;
+  using Hit = typename Tree::Hit;
+
+  /// Throws Error where the query is not finite or of another dimension.
+  template <Point Query>
+  NearestFirst(const Tree& tree, const Query& query) : tree_(&tree), query_(tree.dimension()) {
+    if (tree.empty()) return;
+    detail::copy_point<Real>(query, query_.size(), query_.data(), {"NearestFirst: query", 0});
+    cells_.push_back({0, 0, 0, {}});
+  }
+
+  /// The next nearest point, with its true distance; nothing when all have been given.
+  std::optional<Hit> next() {
+    while (!cells_.empty() && (hits_.empty() || cells_.front().bound <= hits_.front().distance))
+      open_nearest_cell();
+    if (hits_.empty()) return std::nullopt;
+    std::pop_heap(hits_.begin(), hits_.end(), farther_hit);
+    const Hit hit = hits_.back();
+    hits_.pop_back();
+    return Hit{hit.id, tree_->metric().restore(hit.distance)};
+  }
+
+private:
+  /// How far a cell is along one axis, kept for the axes on which it does not contain the query.
+  struct Offset {
+    std::uint32_t axis;
+    Real offset;
+  };
+  struct Cell {
+    Real bound;
+    unsigned depth;
+    std::size_t slot;
+    std::vector<Offset> offsets;
+  };
+  /// Takes every point of a leaf.
+  struct Everything {
+    std::vector<Hit>* hits;
+    [[nodiscard]] Real limit() const noexcept { return std::numeric_limits<Real>::infinity(); }
+    void offer(PointId id, Real reduced) {
+      hits->push_back({id, reduced});
+      std::push_heap(hits->begin(), hits->end(), farther_hit);
+    }
+  };
+
+  static bool farther_cell(const Cell& a, const Cell& b) noexcept { return a.bound > b.bound; }
+  static bool farther_hit(const Hit& a, const Hit& b) noexcept { return nearer(b, a); }
+
+  void open_nearest_cell() {
+    std::pop_heap(cells_.begin(), cells_.end(), farther_cell);
+    Cell cell = std::move(cells_.back());
+    cells_.pop_back();
+    for (;; ++cell.depth) {
+      const detail::Range leaves = tree_->layout().leaves_below(cell.depth, cell.slot);
+      if (leaves.size() == 1) {
+        Everything everything{&hits_};
+        Work work;
+        return tree_->scan_leaf(leaves.begin, query_.data(), everything, work);
+      }
+      const auto& split = tree_->split(cell.depth, cell.slot);
+      const Real offset = query_[split.axis] - static_cast<Real>(split.value);
+      const std::size_t near = 2 * cell.slot + (offset < 0 ? 0 : 1);
+      queue_far_side(cell, split.axis, offset, near ^ 1U);
+      cell.slot = near;
+    }
+  }
+
+  void queue_far_side(const Cell& cell, std::uint32_t axis, Real offset, std::size_t slot) {
+    Cell far{cell.bound, cell.depth + 1, slot, cell.offsets};
+    auto at =
+        std::find_if(far.offsets.begin(), far.offsets.end(), [&](const Offset& o) { return o.axis == axis; });
+    const Real old = at == far.offsets.end() ? Real{0} : at->offset;
+    far.bound = detail::moved_bound(tree_->metric(), cell.bound, old, offset, axis);
+    if (at == far.offsets.end())
+      far.offsets.push_back({axis, offset});
+    else
+      at->offset = offset;
+    cells_.push_back(std::move(far));
+    std::push_heap(cells_.begin(), cells_.end(), farther_cell);
+  }
+
+  const Tree* tree_;
+  std::vector<Real> query_;
+  std::vector<Cell> cells_;
+  std::vector<Hit> hits_;  ///< reduced distances
+};
+
+}  // namespace cairn::inline CAIRN_ABI

@@ -1,0 +1,128 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// Saving a kd-tree and loading it again.
+///
+///   bytes 0-7    "cairnkd" and a zero
+///   8-11         version of the format: 1           all numbers little-endian
+///   12-15        bytes a coordinate (1, 4 or 8)
+///   16-23        dimension
+///   24-31        points
+///   32-39        FNV-1a checksum (64 bits) of all bytes from 40 on
+///   40-          ids (4 bytes each), then coordinates, point by point in leaf order
+///
+/// Loading checks the sum and every coordinate and splits the points anew, so that no damaged file makes a
+/// damaged tree; that costs a build (about 0.1 us a point in three dimensions).
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <istream>
+#include <ostream>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <cairn/core/check.hpp>
+#include <cairn/index/kd_tree.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+namespace detail {
+
+static_assert(std::endian::native == std::endian::little,
+              "tree files are written as memory on little-endian machines");
+
+struct TreeFileHeader {
+  std::array<char, 8> magic{'c', 'a', 'i', 'r', 'n', 'k', 'd', '\0'};
+  std::uint32_t version = 1;
+  std::uint32_t scalar_bytes = 0;
+  std::uint64_t dimension = 0;
+  std::uint64_t points = 0;
+  std::uint64_t checksum = 0;
+};
+static_assert(sizeof(TreeFileHeader) == 40);
+
+inline std::uint64_t fnv1a(std::span<const char> bytes, std::uint64_t hash = 0xcbf29ce484222325ULL) noexcept {
+  for (const char byte : bytes) hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3ULL;
+  return hash;
+}
+
+template <class T>
+std::span<const char> bytes_of(const std::vector<T>& numbers) noexcept {
+  return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(T)};
+}
+
+/// Reads `count` numbers a piece at a time, so that a header that promises too much costs no memory.
+template <class T>
+std::vector<T> read_numbers(std::istream& in, std::uint64_t count, const std::string& name) {
+  constexpr std::uint64_t piece = 1 << 16;
+  std::vector<T> numbers;
+  while (numbers.size() < count) {
+    const std::size_t old = numbers.size();
+    const auto size = static_cast<std::size_t>(std::min<std::uint64_t>(piece, count - old));
+    numbers.resize(old + size);
+    if (!in.read(reinterpret_cast<char*>(numbers.data() + old),
+                 static_cast<std::streamsize>(size * sizeof(T))))
+      raise(name + ": the tree file ends early, expected " + std::to_string(count) + " numbers");
+  }
+  return numbers;
+}
+
+}  // namespace detail
+
+/// Writes the points and ids of a tree. Throws Error where the stream fails; open it in binary mode.
+template <class Scalar, std::size_t Dim, class M>
+void save_tree(std::ostream& out, const KdTree<Scalar, Dim, M>& tree) {
+  std::vector<PointId> ids;
+  std::vector<Scalar> rows;
+  ids.reserve(tree.size());
+  rows.reserve(tree.size() * tree.dimension());
+  tree.for_each([&](PointId id, std::span<const Scalar> row) {
+    ids.push_back(id);
+    rows.insert(rows.end(), row.begin(), row.end());
+  });
+  detail::TreeFileHeader header;
+  header.scalar_bytes = sizeof(Scalar);
+  header.dimension = tree.dimension();
+  header.points = tree.size();
+  header.checksum = detail::fnv1a(detail::bytes_of(rows), detail::fnv1a(detail::bytes_of(ids)));
+  out.write(reinterpret_cast<const char*>(&header), sizeof(header));
+  for (const std::span<const char> part : {detail::bytes_of(ids), detail::bytes_of(rows)})
+    out.write(part.data(), static_cast<std::streamsize>(part.size()));
+  if (!out.flush()) raise("save_tree: the tree could not be written");
+}
+
+/// Reads a tree of the same kind. Throws Error, with `name` of the source, for what is no tree file, a newer
+/// version, another kind of coordinates or dimension, a truncated or damaged one.
+template <class Tree, class Scalar = typename Tree::Coordinate>
+[[nodiscard]] Tree load_tree(std::istream& in, const std::string& name) {
+  const detail::TreeFileHeader expected;
+  detail::TreeFileHeader header;
+  if (!in.read(reinterpret_cast<char*>(&header), sizeof(header)) || header.magic != expected.magic)
+    raise(name + ": not a cairn tree file");
+  if (header.version != expected.version)
+    raise(name + ": version " + std::to_string(header.version) + " of the tree format, expected 1");
+  if (header.scalar_bytes != sizeof(Scalar))
+    raise(name + ": coordinates of " + std::to_string(header.scalar_bytes) + " bytes, expected " +
+          std::to_string(sizeof(Scalar)));
+  const std::size_t dim = Tree::fixed_dimension;
+  if ((dim != dynamic_dim && header.dimension != dim) || header.dimension > (1U << 16))
+    raise(name + ": dimension " + std::to_string(header.dimension) + ", expected " +
+          (dim != dynamic_dim ? std::to_string(dim) : "at most 65536"));
+  if (header.points >= no_point) raise(name + ": " + std::to_string(header.points) + " points are too many");
+  const auto ids = detail::read_numbers<PointId>(in, header.points, name);
+  const auto rows = detail::read_numbers<Scalar>(in, header.points * header.dimension, name);
+  if (detail::fnv1a(detail::bytes_of(rows), detail::fnv1a(detail::bytes_of(ids))) != header.checksum)
+    raise(name + ": the checksum is wrong, the tree file is damaged");
+  if (ids.empty()) return Tree();
+  return Tree(Rows<Scalar>(rows, header.dimension), std::span<const PointId>(ids));
+}
+
+}  // namespace cairn::inline CAIRN_ABI

@@ -1,0 +1,15 @@
+# A project without CMake: the compiler and pkg-config.
+include("${CMAKE_CURRENT_LIST_DIR}/steps.cmake")
+find_program(pkg_config pkg-config)
+if(NOT pkg_config)
+  message("skipped: no pkg-config")
+  return()
+endif()
+install_cairn()
+set(ENV{PKG_CONFIG_PATH} "${prefix}/share/pkgconfig:$ENV{PKG_CONFIG_PATH}")
+execute_process(COMMAND "${pkg_config}" --cflags "cairn = ${version}"
+  OUTPUT_VARIABLE flags OUTPUT_STRIP_TRAILING_WHITESPACE COMMAND_ERROR_IS_FATAL ANY)
+separate_arguments(flags)
+file(WRITE "${work}/every_header.hpp" "#include <cairn/core/linalg.hpp>\n")
+run("${compiler}" ${flags} "-I${work}" "${project}/main.cpp" "${project}/other.cpp" -o "${work}/program")
+run("${work}/program")

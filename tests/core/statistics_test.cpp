@@ -1,0 +1,60 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include <cairn/core/random.hpp>
+#include <cairn/core/statistics.hpp>
+
+TEST_SUITE("statistics") {
+  TEST_CASE("chi_square_quantile: agrees with printed tables") {
+    CHECK(cairn::chi_square_quantile(0.95, 1) == doctest::Approx(3.841458820694124).epsilon(1e-12));
+    CHECK(cairn::chi_square_quantile(0.99, 3) == doctest::Approx(11.344866730144373).epsilon(1e-12));
+    CHECK(cairn::chi_square_quantile(0.5, 10) == doctest::Approx(9.341817765591976).epsilon(1e-12));
+    CHECK(cairn::chi_square_quantile(0.0, 3) == 0.0);
+  }
+
+  TEST_CASE("chi_square_mean_band: the bands of the consistency tests") {
+    const auto band = cairn::chi_square_mean_band(3, 50);
+    CHECK(band.low == doctest::Approx(2.36).epsilon(0.003));
+    CHECK(band.high == doctest::Approx(3.72).epsilon(0.003));
+    CHECK(band.contains(3.0));
+    CHECK_FALSE(band.contains(4.0));
+  }
+
+  TEST_CASE("chi_square_cdf: equals its closed form for two degrees of freedom") {
+    for (const double x : {0.01, 0.5, 2.0, 7.0, 40.0})
+      CHECK(cairn::chi_square_cdf(x, 2) == doctest::Approx(1.0 - std::exp(-0.5 * x)).epsilon(1e-13));
+    CHECK(cairn::chi_square_cdf(-1.0, 2) == 0.0);
+    CHECK(cairn::chi_square_cdf(INFINITY, 2) == 1.0);
+  }
+
+  TEST_CASE("log_sum_exp: survives numbers whose exponentials do not") {
+    const std::vector<double> values{-1000.0, -1000.0, -1000.0, -1000.0};
+    CHECK(cairn::log_sum_exp(values) == doctest::Approx(-1000.0 + std::log(4.0)));
+    CHECK(cairn::log_sum_exp({}) == -INFINITY);
+  }
+
+  TEST_CASE("running moments: equal the two-pass formulas far from zero") {
+    cairn::Random random(7);
+    std::vector<double> values(1000);
+    cairn::RunningMoments moments;
+    for (double& value : values) moments.add(value = 1e9 + random.normal());
+    double mean = 0;
+    for (const double value : values) mean += value - 1e9;
+    mean /= 1000;
+    double squares = 0;
+    for (const double value : values) squares += (value - 1e9 - mean) * (value - 1e9 - mean);
+    CHECK(moments.mean() - 1e9 == doctest::Approx(mean).epsilon(1e-6));
+    CHECK(moments.variance() == doctest::Approx(squares / 999).epsilon(1e-6));
+  }
+
+  TEST_CASE("quantile: interpolates between order statistics") {
+    CHECK(cairn::median({3.0, 1.0, 2.0}) == 2.0);
+    CHECK(cairn::median({4.0, 1.0, 2.0, 3.0}) == 2.5);
+    CHECK(cairn::quantile({0.0, 10.0}, 0.95) == doctest::Approx(9.5));
+    CHECK(std::isnan(cairn::median({})));
+  }
+}

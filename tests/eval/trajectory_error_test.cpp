@@ -1,0 +1,194 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include <cairn/core/random.hpp>
+#include <cairn/eval/trajectory_error.hpp>
+#include <cairn/io/trajectory.hpp>
+
+#include "support/data.hpp"
+#include "support/random.hpp"
+
+using cairn::AlignBy;
+using cairn::PosePair;
+using cairn::SE3;
+using cairn::SO3;
+using cairn::Trajectory;
+using cairn::Vector;
+
+namespace {
+
+SE3 random_pose(cairn::Random& random, double metres) {
+  return SE3(SO3::from_quaternion(random.normal(), random.normal(), random.normal(), random.normal()),
+             metres * Vector<3>(random.normal(), random.normal(), random.normal()));
+}
+
+std::vector<PosePair> random_pairs(cairn::Random& random, std::size_t count) {
+  std::vector<PosePair> pairs;
+  for (std::size_t i = 0; i < count; ++i) {
+    const SE3 truth = random_pose(random, 5.0);
+    pairs.push_back({0.1 * static_cast<double>(i), truth, truth});
+  }
+  return pairs;
+}
+
+// The pairs seen from another world: p' = scale * R p + t.
+std::vector<PosePair> moved(std::vector<PosePair> pairs, const SE3& T, double scale) {
+  for (PosePair& pair : pairs)
+    pair.estimate = SE3(T.rotation() * pair.estimate.rotation(),
+                        scale * (T.rotation() * pair.estimate.translation()) + T.translation());
+  return pairs;
+}
+
+}  // namespace
+
+TEST_SUITE("trajectory_error") {
+  TEST_CASE("trajectory_error: statistics equal their definitions") {
+    const cairn::ErrorStatistics s = cairn::error_statistics({3.0, 1.0, 2.0, 6.0});
+    CHECK(s.count == 4);
+    CHECK(s.sum_of_squares == 50.0);
+    CHECK(s.rmse == doctest::Approx(std::sqrt(12.5)));
+    CHECK(s.mean == 3.0);
+    CHECK(s.median == 2.5);
+    CHECK(s.standard_deviation == doctest::Approx(std::sqrt(3.5)));
+    CHECK(s.smallest == 1.0);
+    CHECK(s.largest == 6.0);
+    CHECK(cairn::error_statistics({}).rmse == 0.0);
+  }
+
+  TEST_CASE("trajectory_error: an estimate in another world has no error once it is aligned") {
+    const std::uint64_t seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const std::vector<PosePair> pairs = random_pairs(random, 50);
+    const SE3 T = random_pose(random, 100.0);
+    const auto rigid = cairn::absolute_error(moved(pairs, T, 1.0), AlignBy::rigid);
+    const auto first = cairn::absolute_error(moved(pairs, T, 1.0), AlignBy::first_pose);
+    const auto scaled = cairn::absolute_error(moved(pairs, T, 0.25), AlignBy::similarity);
+    const auto none = cairn::absolute_error(moved(pairs, T, 1.0), AlignBy::none);
+    for (const auto& error : {rigid, first, scaled}) {
+      REQUIRE(error.has_value());
+      CHECK(error->translation.largest < 1e-11);
+      CHECK(error->rotation.largest < 1e-11);
+    }
+    CHECK(scaled->scale == doctest::Approx(4.0).epsilon(1e-12));
+    REQUIRE(none.has_value());
+    double squares = 0;
+    for (const PosePair& pair : moved(pairs, T, 1.0))
+      squares += (pair.estimate.translation() - pair.truth.translation()).squaredNorm();
+    CHECK(none->translation.sum_of_squares == doctest::Approx(squares));
+  }
+
+  TEST_CASE("trajectory_error: no rigid motion near the alignment has a smaller error") {
+    const std::uint64_t seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    std::vector<PosePair> pairs = random_pairs(random, 30);
+    for (PosePair& pair : pairs)
+      pair.estimate = SE3(SO3(), pair.truth.translation() +
+                                     0.2 * Vector<3>(random.normal(), random.normal(), random.normal()));
+    const auto best = cairn::absolute_error(pairs, AlignBy::rigid);
+    REQUIRE(best.has_value());
+    for (int i = 0; i < 6; ++i)
+      for (const double size : {1e-3, -1e-3}) {
+        Vector<6> d = Vector<6>::Zero();
+        d(i) = size;
+        const SE3 other = best->T_truth_estimate * SE3::exp(d);
+        const auto error = cairn::absolute_error(moved(pairs, other, 1.0), AlignBy::none);
+        CHECK(error->translation.sum_of_squares > best->translation.sum_of_squares);
+      }
+  }
+
+  TEST_CASE("trajectory_error: nothing to align by is no figure, not a wrong one") {
+    CHECK_FALSE(cairn::absolute_error({}, AlignBy::rigid).has_value());
+    const std::vector<PosePair> still(5, PosePair{0.0, SE3(), SE3()});
+    CHECK_FALSE(cairn::absolute_error(still, AlignBy::rigid).has_value());
+    CHECK(cairn::absolute_error(still, AlignBy::first_pose)->translation.rmse == 0.0);
+  }
+
+  TEST_CASE("trajectory_error: a straight path is aligned") {
+    std::vector<PosePair> line;
+    for (int i = 0; i < 20; ++i)
+      line.push_back({0.0, SE3(SO3(), Vector<3>(0, 0, i)), SE3(SO3(), Vector<3>(i, 7, 0))});
+    const auto error = cairn::absolute_error(line, AlignBy::rigid);
+    REQUIRE(error.has_value());
+    CHECK(error->translation.rmse < 1e-12);
+  }
+
+  TEST_CASE("relative_error: a constant slip per frame shows in frames and in metres") {
+    const SE3 truth_step(SO3(), Vector<3>(1, 0, 0));
+    const SE3 slip(SO3::exp(Vector<3>(0, 0, 0.01)), Vector<3>(0.02, 0, 0));
+    std::vector<PosePair> pairs(1);
+    for (int i = 1; i < 101; ++i)
+      pairs.push_back({static_cast<double>(i), pairs.back().truth * truth_step,
+                       pairs.back().estimate * truth_step * slip});
+    const auto frames = cairn::relative_error(pairs);
+    REQUIRE(frames.has_value());
+    CHECK(frames->translation.count == 100);
+    CHECK(frames->translation.rmse == doctest::Approx(0.02).epsilon(1e-9));
+    CHECK(frames->rotation.rmse == doctest::Approx(0.01).epsilon(1e-9));
+    const auto metres = cairn::relative_error(pairs, {.delta = 10, .unit = cairn::DeltaUnit::metres});
+    REQUIRE(metres.has_value());
+    CHECK(metres->rotation.count == 10);  // one after the other
+    CHECK(metres->rotation.mean == doctest::Approx(0.1).epsilon(1e-9));
+    const auto all =
+        cairn::relative_error(pairs, {.delta = 10, .unit = cairn::DeltaUnit::metres, .all_pairs = true});
+    REQUIRE(all.has_value());
+    CHECK(all->rotation.count == 92);  // from 0..90, and 91 takes the end: 9 m are within 10 %
+    const auto tens = cairn::relative_error(pairs, {.delta = 10, .all_pairs = true});
+    CHECK(tens->rotation.count == 91);
+    CHECK(tens->rotation.largest == doctest::Approx(0.1).epsilon(1e-9));
+    CHECK_FALSE(cairn::relative_error(pairs, {.delta = 101}).has_value());
+    CHECK_FALSE(cairn::relative_error(pairs, {.delta = 500, .unit = cairn::DeltaUnit::metres}).has_value());
+  }
+
+  TEST_CASE("associate: the nearest in time, one to one, within the limit") {
+    Trajectory truth, estimate;
+    for (int i = 0; i < 10; ++i) truth.push_back({static_cast<double>(i), SE3(SO3(), Vector<3>(i, 0, 0))});
+    for (const double time : {-0.005, 0.004, 0.96, 2.5, 4.008, 9.02, 30.0})
+      estimate.push_back({time, SE3(SO3(), Vector<3>(time, 1, 0))});
+    const auto pairs = cairn::associate(truth, estimate, {.largest_difference = 0.05});
+    REQUIRE(pairs.size() == 4);
+    CHECK(pairs[0].time == 0.004);  // nearer than -0.005
+    CHECK(pairs[1].time == 0.96);
+    CHECK(pairs[2].truth.translation()(0) == 4.0);
+    CHECK(pairs[3].time == 9.02);
+    CHECK(cairn::associate(truth, estimate).size() == 2);
+    CHECK(cairn::associate(truth, estimate, {.largest_difference = 0.01, .offset = -0.02}).size() == 1);
+    CHECK(cairn::associate({}, estimate).empty());
+    CHECK(cairn::associate(truth, {}).empty());
+    CHECK_THROWS_AS(static_cast<void>(cairn::associate_by_index(truth, estimate)), cairn::Error);
+  }
+
+  TEST_CASE("trajectory_error: published trajectories give published figures") {
+    const auto data = cairn_test::real_data("trajectories");
+    if (!data) return;
+    const Trajectory kitti = cairn::read_kitti(*data / "KITTI_00_gt.txt");
+    const auto ate = [](const std::vector<PosePair>& pairs, AlignBy by) {
+      const auto error = cairn::absolute_error(pairs, by);
+      REQUIRE(error.has_value());
+      return error->translation.rmse;
+    };
+    const auto orb = cairn::associate_by_index(kitti, cairn::read_kitti(*data / "KITTI_00_ORB.txt"));
+    CHECK(std::abs(ate(orb, AlignBy::rigid) - 1.303) < 0.0005);
+    const auto sptam = cairn::associate_by_index(kitti, cairn::read_kitti(*data / "KITTI_00_SPTAM.txt"));
+    CHECK(std::abs(ate(sptam, AlignBy::rigid) - 3.74) < 0.005);
+
+    // ORB-SLAM2 gives 0.9 cm for fr2/desk, aligned rigidly (Mur-Artal, Tardos, T-RO 2017, table III).
+    const auto desk = cairn::associate(cairn::read_tum(*data / "fr2_desk_groundtruth.txt"),
+                                       cairn::read_tum(*data / "fr2_desk_ORB.txt"));
+    CHECK(desk.size() == 2174);
+    CHECK(std::abs(ate(desk, AlignBy::rigid) - 0.009) < 0.001);
+    CHECK(ate(desk, AlignBy::similarity) < ate(desk, AlignBy::rigid));
+    const auto v102 = cairn::associate(cairn::read_euroc(*data / "V102_groundtruth.csv"),
+                                       cairn::read_tum(*data / "V102.txt"));
+    CHECK(v102.size() == 794);
+    CHECK(std::abs(ate(v102, AlignBy::rigid) - 0.092) < 0.0005);
+    CHECK(ate(v102, AlignBy::similarity) < ate(v102, AlignBy::rigid));
+  }
+}

@@ -1,0 +1,144 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "pipeline.hpp"
+
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include "arena_dataset.hpp"
+#include "support/data.hpp"
+#include "support/folder.hpp"
+
+namespace {
+
+using stereo_slam::FrameRecord;
+using stereo_slam::PipelineOptions;
+using stereo_slam::RunRecord;
+using stereo_slam::StereoFrame;
+
+/// A small arena drive, rendered once for all tests of this file.
+const std::vector<StereoFrame>& drive() {
+  static const std::vector<StereoFrame> frames = [] {
+    stereo_slam::ArenaOptions arena;
+    arena.script = "loop";
+    arena.width = 384;
+    arena.height = 288;
+    arena.cache = false;
+    const auto dataset = stereo_slam::open_arena(arena, 14, 2);
+    std::vector<StereoFrame> result;
+    for (std::size_t i = 0; i < dataset->size(); ++i) result.push_back(dataset->frame(i));
+    return result;
+  }();
+  return frames;
+}
+
+const cairn::StereoRig& rig() {
+  static const cairn::StereoRig result = [] {
+    stereo_slam::ArenaOptions arena;
+    arena.script = "loop";
+    arena.width = 384;
+    arena.height = 288;
+    arena.cache = false;
+    return stereo_slam::open_arena(arena, 1, 1)->rig();
+  }();
+  return result;
+}
+
+PipelineOptions options(unsigned threads = 1) {
+  PipelineOptions result;
+  result.points = 700;
+  result.threads = threads;
+  return result;
+}
+
+RunRecord run(const std::vector<StereoFrame>& frames, const PipelineOptions& with) {
+  stereo_slam::Pipeline pipeline(rig(), with);
+  for (const StereoFrame& frame : frames) pipeline.step(frame);
+  return pipeline.record();
+}
+
+bool same_bits(const RunRecord& a, const RunRecord& b) {
+  if (a.frames.size() != b.frames.size() || a.landmarks.size() != b.landmarks.size()) return false;
+  for (std::size_t i = 0; i < a.frames.size(); ++i)
+    if (a.frames[i].T_world_camera.matrix() != b.frames[i].T_world_camera.matrix()) return false;
+  for (std::size_t i = 0; i < a.landmarks.size(); ++i)
+    if (a.landmarks[i].position != b.landmarks[i].position) return false;
+  return true;
+}
+
+StereoFrame black(StereoFrame frame) {
+  frame.left = cairn::Image(frame.left.width(), frame.left.height());
+  frame.right = frame.left;
+  return frame;
+}
+
+}  // namespace
+
+TEST_SUITE("pipeline") {
+  TEST_CASE("pipeline: follows a rendered drive within centimetres") {
+    const RunRecord record = run(drive(), options());
+    REQUIRE(record.frames.size() == drive().size());
+    for (const FrameRecord& frame : record.frames) {
+      CAPTURE(frame.index);
+      CHECK(frame.tracked);
+      REQUIRE(frame.truth);
+      const auto error = cairn::local(*frame.truth, frame.T_world_camera);
+      CHECK(error.head<3>().norm() < 0.02);
+      CHECK(error.tail<3>().norm() < 0.006);
+    }
+    CHECK(record.frames.back().inliers > 100);
+    CHECK(record.landmarks.size() == record.frames.back().landmarks);
+  }
+
+  TEST_CASE("pipeline: has the same bits for 1, 2 and 3 threads") {
+    const RunRecord one = run(drive(), options(1));
+    CHECK(same_bits(one, run(drive(), options(2))));
+    CHECK(same_bits(one, run(drive(), options(3))));
+  }
+
+  TEST_CASE("pipeline: the single and the multi store give the same run when the budget is unlimited") {
+    PipelineOptions multi = options();
+    multi.store.leaves = std::numeric_limits<std::size_t>::max();
+    multi.store.shape.first_size = 200;  // small, so that the forest has several trees
+    PipelineOptions single = multi;
+    single.store.kind = stereo_slam::StoreKind::single;
+    CHECK(same_bits(run(drive(), multi), run(drive(), single)));
+  }
+
+  TEST_CASE("pipeline: a black pair is lost, said, counted, and the drive goes on") {
+    std::vector<StereoFrame> frames = drive();
+    frames[6] = black(frames[6]);
+    const RunRecord record = run(frames, options());
+    CHECK_FALSE(record.frames[6].tracked);
+    CHECK(record.frames[6].T_world_camera.matrix() == record.frames[5].T_world_camera.matrix());
+    CHECK(record.frames[7].tracked);
+    const auto error = cairn::local(*record.frames.back().truth, record.frames.back().T_world_camera);
+    CHECK(error.head<3>().norm() < 0.02);
+    REQUIRE(record.notes.size() == 1);
+    CHECK(record.notes[0].find("lost") != std::string::npos);
+  }
+
+  TEST_CASE("pipeline: the world begins where something is seen first") {
+    std::vector<StereoFrame> frames = drive();
+    frames[0] = black(frames[0]);
+    const RunRecord record = run(frames, options());
+    CHECK_FALSE(record.frames[0].tracked);
+    CHECK(record.frames[1].tracked);
+    CHECK(record.frames.back().tracked);
+  }
+
+  TEST_CASE("pipeline: nothing but black frames leaves an empty map and no NaN") {
+    std::vector<StereoFrame> frames{black(drive()[0]), black(drive()[1])};
+    const RunRecord record = run(frames, options());
+    CHECK(record.landmarks.empty());
+    for (const FrameRecord& frame : record.frames) {
+      CHECK_FALSE(frame.tracked);
+      CHECK(frame.T_world_camera.matrix().allFinite());
+    }
+  }
+}

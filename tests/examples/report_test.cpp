@@ -1,0 +1,160 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "support/report.hpp"
+
+#include <limits>
+#include <string>
+
+#include <doctest/doctest.h>
+#include <nlohmann/json.hpp>
+
+#include "examples/synthetic_run.hpp"
+#include "run_report.hpp"
+#include "support/folder.hpp"
+
+using cairn_test::message_of;
+using example::Ink;
+using example::Report;
+
+namespace {
+
+constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
+
+nlohmann::json data_of(const Report& report) {
+  return nlohmann::json::parse(report.data());
+}
+
+nlohmann::json panel_called(const nlohmann::json& data, const std::string& title) {
+  for (const auto& panel : data["panels"])
+    if (panel["title"] == title) return panel;
+  FAIL("no panel is called " << title);
+  return {};
+}
+
+}  // namespace
+
+TEST_SUITE_BEGIN("examples/report");
+
+TEST_CASE("report: an empty page is valid") {
+  const auto data = data_of(Report("title", "subtitle"));
+  CHECK(data["title"] == "title");
+  CHECK(data["panels"].empty());
+}
+
+TEST_CASE("report: curves keep six digits, and gaps are null") {
+  Report report("title", "");
+  report.add(example::LinePlot{.title = "lines",
+                               .x = {"time", "s"},
+                               .y = {"error", "m"},
+                               .x_values = {0, 1, 2},
+                               .curves = {{"a", Ink::wrong, {1.23456789, not_a_number, -1e300}, true}}});
+  const auto panel = data_of(report)["panels"][0];
+  CHECK(panel["kind"] == "lines");
+  CHECK(panel["x"]["unit"] == "s");
+  CHECK(panel["curves"][0]["ink"] == "wrong");
+  CHECK(panel["curves"][0]["dashed"] == true);
+  CHECK(panel["curves"][0]["values"][0] == 1.23457);
+  CHECK(panel["curves"][0]["values"][1].is_null());
+  CHECK(panel["curves"][0]["values"][2] == -1e300);
+}
+
+TEST_CASE("report: points are packed as little-endian floats, those not finite left out with their values") {
+  Report report("title", "");
+  report.add(
+      example::Cloud{.title = "cloud",
+                     .unit = "m",
+                     .points = {{1, 2, -0.5F}, {std::numeric_limits<float>::infinity(), 0, 0}, {0, 0, 0}},
+                     .colourings = {{"age", "frames", {3, 4, 5}}},
+                     .curves = {}});
+  const auto panel = data_of(report)["panels"][0];
+  CHECK(panel["points"] == "AACAPwAAAEAAAAC/AAAAAAAAAAAAAAAA");  // 0000803f 00000040 000000bf 0 0 0
+  CHECK(panel["colourings"][0]["values"] == "AABAQAAAoEA=");     // 00004040 0000a040
+}
+
+TEST_CASE("report: a panel that does not fit together is refused by name") {
+  Report report("title", "");
+  const auto lines = [&](std::vector<double> x, std::vector<double> y) {
+    return message_of([&] {
+      report.add(example::LinePlot{.title = "speeds", .x_values = x, .curves = {{"left", Ink::belief, y}}});
+    });
+  };
+  CHECK(lines({0, 1}, {5}).find("\"speeds\": expected 2 values of \"left\", found 1") != std::string::npos);
+  CHECK(lines({1, 0}, {5, 5}).find("never fall, x value 1 does") != std::string::npos);
+  CHECK(lines({0, not_a_number}, {5, 5}).find("never fall, x value 1 does") != std::string::npos);
+  CHECK(message_of([&] {
+          report.add(example::PlanePlot{.title = "map", .curves = {{"way", Ink::truth, {1, 2}, {1}}}});
+        }).find("\"map\": expected 2 values of \"way\", found 1") != std::string::npos);
+  CHECK(message_of([&] {
+          report.add(example::Table{.title = "table", .columns = {"a", "b"}, .rows = {{"1"}}});
+        }).find("expected 2 values of \"a row\", found 1") != std::string::npos);
+  CHECK(data_of(report)["panels"].empty());
+}
+
+TEST_CASE("report: what the data says cannot end the script it stands in") {
+  Report report("a </script><b> & c", "");
+  report.note("</script><script>alert(1)</script>");
+  CHECK(data_of(report)["title"] == "a </script><b> & c");
+  const auto html = report.html();
+  if (!html) {
+    MESSAGE("skipped: built without the page");
+    return;
+  }
+  CHECK(html->find("<title>a &lt;/script>&lt;b> &amp; c</title>") != std::string::npos);
+  CHECK(html->find("alert(1)") != std::string::npos);
+  CHECK(html->find("<script>alert(1)") == std::string::npos);
+  CHECK(html->find("@CAIRN_REPORT") == std::string::npos);
+}
+
+TEST_CASE("report: the page asks nothing of the network") {
+  const auto html = Report("title", "").html();
+  if (!html) {
+    MESSAGE("skipped: built without the page");
+    return;
+  }
+  for (const char* reference : {"src=\"http", "href=\"http", "src=\"//", "@import", "url(http"}) {
+    CAPTURE(reference);
+    CHECK(html->find(reference) == std::string::npos);
+  }
+}
+
+TEST_CASE("report of a run: every panel of the main job is there") {
+  const auto run = cairn_test::circular_run(60, 200);
+  const auto data = data_of(stereo_slam::run_report(run, stereo_slam::summarise(run)));
+  CHECK(panel_called(data, "Path from above")["curves"].size() == 2);
+  CHECK(panel_called(data, "Position error")["curves"][0]["values"].size() == 60);
+  CHECK(panel_called(data, "Heading error")["y"]["unit"] == "deg");
+  CHECK(panel_called(data, "Points and matches")["curves"].size() == 4);
+  CHECK(panel_called(data, "Landmarks")["curves"].size() == 1);
+  CHECK(panel_called(data, "Time per stage")["bars"].size() == stereo_slam::stage_names.size());
+  CHECK(panel_called(data, "Landmarks and path")["colourings"].size() == 4);
+  const auto picture = panel_called(data, "One frame with its matches");
+  CHECK(picture["png"].get<std::string>().starts_with("iVBORw0KGgo"));  // the signature of PNG
+  CHECK(picture["marks"][1]["count"] == 90);                            // every tenth of 900
+}
+
+TEST_CASE("report of a run: without truth, sample or landmarks the panels say so") {
+  auto run = cairn_test::straight_run(5);
+  for (auto& frame : run.frames) {
+    frame.truth.reset();
+    frame.time = 0;  // a clock that stands still: frame numbers instead
+    frame.covariance.setConstant(not_a_number);
+  }
+  const auto data = data_of(stereo_slam::run_report(run, stereo_slam::summarise(run)));
+  CHECK(panel_called(data, "Position error")["curves"].empty());
+  CHECK(panel_called(data, "Position error")["caption"].get<std::string>().find("no truth") !=
+        std::string::npos);
+  CHECK(panel_called(data, "Path from above")["curves"].size() == 1);
+  CHECK(panel_called(data, "One frame with its matches")["png"] == "");
+  CHECK(panel_called(data, "Landmarks")["x"]["label"] == "frame");
+}
+
+TEST_CASE("report: readable numbers are short") {
+  CHECK(example::readable(0.0123456) == "0.0123");
+  CHECK(example::readable(1234567) == "1.23e+06");
+  CHECK(example::readable(12345.6) == "12346");
+  CHECK(example::readable(999.6) == "1000");
+  CHECK(example::readable(12, 2) == "12");
+  CHECK(example::readable(not_a_number) == "none");
+}
+
+TEST_SUITE_END();

@@ -1,0 +1,170 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "summary.hpp"
+
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include <doctest/doctest.h>
+#include <nlohmann/json.hpp>
+
+#include "examples/synthetic_run.hpp"
+#include "support/folder.hpp"
+
+using cairn_test::pose;
+using cairn_test::straight_run;
+using doctest::Approx;
+using stereo_slam::RunRecord;
+using stereo_slam::summarise;
+using stereo_slam::Summary;
+
+namespace {
+
+constexpr double degree = std::numbers::pi / 180.0;
+
+nlohmann::json json_of(const RunRecord& run) {
+  return nlohmann::json::parse(stereo_slam::summary_json(run, summarise(run)));
+}
+
+}  // namespace
+
+TEST_SUITE_BEGIN("stereo_slam/summary");
+
+TEST_CASE("summary: a run without error has none") {
+  const Summary summary = summarise(straight_run(120));
+  REQUIRE(summary.errors);
+  CHECK(summary.errors->frames == 120);
+  CHECK(summary.errors->ate_rmse == Approx(0).epsilon(1e-9));
+  CHECK(summary.errors->end == 0.0);
+  CHECK(summary.errors->largest.position == 0.0);
+  CHECK(summary.errors->largest.heading == 0.0);
+  CHECK(*summary.errors->kitti_translation_percent == Approx(0).epsilon(1e-9));
+  CHECK_FALSE(summary.errors->revisit);  // straight ahead comes to no place twice
+  CHECK(summary.path == Approx(119));
+}
+
+TEST_CASE("summary: one percent too far shows in every measure as computed by hand") {
+  RunRecord run = straight_run(120);
+  for (std::size_t i = 0; i < 120; ++i)
+    run.frames[i].T_world_camera = pose(0, 0, 1.01 * static_cast<double>(i));
+  const nlohmann::json json = json_of(run);
+  CHECK(json["end_error_m"].get<double>() == Approx(1.19));
+  CHECK(json["max_position_error_m"].get<double>() == Approx(1.19));
+  CHECK(json["max_heading_error_deg"].get<double>() == Approx(0));
+  CHECK(json["rpe_trans_m"].get<double>() == Approx(0.01));
+  CHECK(json["rpe_rot_deg"].get<double>() == Approx(0));
+  // The fit takes the mean of the errors 0, 0.01, ..., 1.19 away: their standard deviation is left.
+  CHECK(json["ate_rmse_m"].get<double>() == Approx(0.01 * std::sqrt((120.0 * 120.0 - 1.0) / 12.0)));
+  CHECK(json["ate_alignment"] == "rigid");
+  // A segment of 100 m ends at the first frame beyond it, after 101 m.
+  CHECK(json["kitti_t_rel_percent"].get<double>() == Approx(1.01));
+  CHECK(json["path_m"].get<double>() == Approx(119));
+}
+
+TEST_CASE("summary: the KITTI measure is null for a path under 100 m") {
+  const nlohmann::json json = json_of(straight_run(60));
+  CHECK(json["kitti_t_rel_percent"].is_null());
+  CHECK(json["ate_rmse_m"].is_number());
+}
+
+TEST_CASE("summary: one frame turned by two degrees is the largest heading error and not the end error") {
+  RunRecord run = straight_run(50);
+  run.frames[20].T_world_camera = pose(0.03, 0, 20, 2 * degree);
+  const nlohmann::json json = json_of(run);
+  CHECK(json["max_heading_error_deg"].get<double>() == Approx(2));
+  CHECK(json["max_position_error_m"].get<double>() == Approx(0.03));
+  CHECK(json["end_error_m"].get<double>() == 0.0);
+}
+
+TEST_CASE("summary: the second lap disagrees with the first by what was put in") {
+  RunRecord run = straight_run(60);
+  for (std::size_t i = 0; i < 60; ++i) {  // two laps of 30 frames around a circle
+    const double angle = 2 * std::numbers::pi * static_cast<double>(i) / 30.0;
+    run.frames[i].truth = pose(std::cos(angle), 0, std::sin(angle), -angle);
+    run.frames[i].T_world_camera = *run.frames[i].truth;
+    if (i >= 30) run.frames[i].T_world_camera = *run.frames[i].truth * pose(0.02, 0, 0.03, 0.1 * degree);
+  }
+  // Frame 45 differs from the rest of its lap; frame 15 saw the same place without an error.
+  run.frames[45].T_world_camera = *run.frames[45].truth * pose(0.06, 0, 0.08, 0.5 * degree);
+  const nlohmann::json json = json_of(run);
+  CHECK(json["revisit_pairs"] == 30);
+  CHECK(json["revisit_position_m"].get<double>() == Approx(0.1));
+  CHECK(json["revisit_heading_deg"].get<double>() == Approx(0.5));
+}
+
+TEST_CASE("summary: the same place looked at in another direction is no return") {
+  RunRecord run = straight_run(60);
+  for (std::size_t i = 0; i < 60; ++i)
+    run.frames[i].truth = run.frames[i].T_world_camera = pose(0, 0, 0, 3 * degree * static_cast<double>(i));
+  CHECK(json_of(run)["revisit_position_m"].is_null());
+  CHECK(json_of(run)["revisit_pairs"] == 0);
+}
+
+TEST_CASE("summary: a run on the spot falls back to the first pose and says so") {
+  RunRecord run = straight_run(10);
+  for (auto& frame : run.frames) frame.truth = frame.T_world_camera = pose(0, 0, 0);
+  const nlohmann::json json = json_of(run);
+  CHECK(json["ate_alignment"] == "first pose");
+  CHECK(json["ate_rmse_m"].get<double>() == 0.0);
+}
+
+TEST_CASE("summary: without a truth the errors are null and the path is the estimate's") {
+  RunRecord run = straight_run(30);
+  for (auto& frame : run.frames) frame.truth.reset();
+  const nlohmann::json json = json_of(run);
+  for (const char* key :
+       {"ate_rmse_m", "ate_alignment", "rpe_trans_m", "rpe_rot_deg", "kitti_t_rel_percent", "end_error_m",
+        "max_position_error_m", "max_heading_error_deg", "revisit_position_m", "revisit_heading_deg"}) {
+    CAPTURE(key);
+    REQUIRE(json.contains(key));
+    CHECK(json[key].is_null());
+  }
+  CHECK(json["frames_with_truth"] == 0);
+  CHECK(json["path_m"].get<double>() == Approx(29));
+}
+
+TEST_CASE("summary: counts, medians and times are those of the frames") {
+  RunRecord run = straight_run(101);
+  run.landmarks.resize(17);
+  run.frames[3].tracked = run.frames[4].tracked = false;
+  run.notes = {"frame 3 was lost"};
+  const nlohmann::json json = json_of(run);
+  CHECK(json["dataset"] == "straight");
+  CHECK(json["store"] == "multi");
+  CHECK(json["seed"] == 7);
+  CHECK(json["threads"] == 2);
+  CHECK(json["target_points"] == 2000);
+  CHECK(json["frames"] == 101);
+  CHECK(json["frames_tracked"] == 99);
+  CHECK(json["frames_lost"] == 2);
+  CHECK(json["seconds"] == 4.0);
+  CHECK(json["hz"].get<double>() == Approx(101.0 / 4));
+  CHECK(json["points_left"] == 1050.0);
+  CHECK(json["stereo_matches"] == 550.0);
+  CHECK(json["map_matches"] == 350.0);
+  CHECK(json["inliers"] == 250.0);
+  CHECK(json["landmarks"] == 17);
+  CHECK(json["notes"][0] == "frame 3 was lost");
+  REQUIRE(json["stage_ms"].size() == stereo_slam::stage_names.size());
+  for (std::size_t stage = 0; stage < stereo_slam::stage_names.size(); ++stage) {
+    const nlohmann::json& time = json["stage_ms"][stereo_slam::stage_names[stage]];
+    CHECK(time["median"].get<double>() == Approx(50.0 + static_cast<double>(stage)));
+    CHECK(time["p95"].get<double>() == Approx(95.0 + static_cast<double>(stage)));
+  }
+}
+
+TEST_CASE("summary: what is not finite becomes null, not invalid JSON") {
+  RunRecord run = straight_run(5);
+  run.seconds = std::numeric_limits<double>::infinity();
+  CHECK(json_of(run)["seconds"].is_null());
+}
+
+TEST_CASE("summary: a run without frames is refused") {
+  CHECK(cairn_test::message_of([] { (void)summarise(RunRecord{}); }).find("at least one frame") !=
+        std::string::npos);
+}
+
+TEST_SUITE_END();

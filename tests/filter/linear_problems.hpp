@@ -1,0 +1,58 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// Random linear-Gaussian problems, on which every Gaussian filter must give the Kalman filter's answer.
+#pragma once
+
+#include <cmath>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/core/random.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/models/linear.hpp>
+
+namespace cairn_test {
+
+/// A random N x N covariance with eigenvalues between about `low` and 1.
+template <int N, class S = double>
+cairn::Matrix<N, N, S> random_covariance(cairn::Random& random, double low = 0.01) {
+  cairn::Matrix<N, N, S> a;
+  for (int i = 0; i < N; ++i)
+    for (int j = 0; j < N; ++j) a(i, j) = static_cast<S>(random.normal() / std::sqrt(double(N)));
+  cairn::Matrix<N, N, S> p = a * a.transpose();
+  for (int i = 0; i < N; ++i) p(i, i) += static_cast<S>(low);
+  return p;
+}
+
+template <int R, int C, class S = double>
+cairn::Matrix<R, C, S> random_matrix(cairn::Random& random, double scale = 1.0) {
+  cairn::Matrix<R, C, S> a;
+  for (int i = 0; i < R; ++i)
+    for (int j = 0; j < C; ++j) a(i, j) = static_cast<S>(scale * random.normal());
+  return a;
+}
+
+/// x' = F x + Q, z = H x + R with correlated Q and R. The last state is seen by nobody directly.
+template <int N, int M, class S = double>
+struct LinearProblem {
+  cairn::LinearModel<N, S> process;
+  cairn::LinearSensor<M, N, S> sensor;
+  cairn::Gaussian<cairn::Vector<N, S>> prior;
+
+  explicit LinearProblem(cairn::Random& random)
+      : process{random_matrix<N, N, S>(random, 0.6 / std::sqrt(double(N))), random_covariance<N, S>(random)},
+        sensor{random_matrix<M, N, S>(random), random_covariance<M, S>(random, 0.1)},
+        prior{random_matrix<N, 1, S>(random), random_covariance<N, S>(random)} {
+    if (N > 1) sensor.design.col(N - 1).setZero();
+  }
+};
+
+/// Largest entry of |a - b| relative to the largest of |b|.
+template <class A, class B>
+double relative_error(const A& a, const B& b) {
+  return static_cast<double>((a - b).cwiseAbs().maxCoeff()) /
+         (1e-300 + static_cast<double>(b.cwiseAbs().maxCoeff()));
+}
+
+}  // namespace cairn_test

@@ -1,0 +1,194 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+// The Nile (Durbin and Koopman, "Time Series Analysis by State Space Methods"): R's 100 annual flows
+// 1871-1970; reference numbers computed with R KFAS 1.6.0.
+#include <cmath>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include <cairn/core/random.hpp>
+#include <cairn/filter/smoother.hpp>
+#include <cairn/filter/steady_state.hpp>
+#include <cairn/models/linear.hpp>
+
+#include "filter/linear_problems.hpp"
+#include "support/random.hpp"
+
+namespace {
+
+using cairn::Gaussian;
+using cairn::Kalman;
+using cairn::Matrix;
+using cairn::Recorder;
+using cairn::Status;
+using cairn::Vector;
+
+const std::vector<double> nile{
+    1120, 1160, 963,  1210, 1160, 1160, 813,  1230, 1370, 1140, 995,  935,  1110, 994, 1020, 960,  1180,
+    799,  958,  1140, 1100, 1210, 1150, 1250, 1260, 1220, 1030, 1100, 774,  840,  874, 694,  940,  833,
+    701,  916,  692,  1020, 1050, 969,  831,  726,  456,  824,  702,  1120, 1100, 832, 764,  821,  768,
+    845,  864,  862,  698,  845,  744,  796,  1040, 759,  781,  865,  845,  944,  984, 897,  822,  1010,
+    771,  676,  649,  846,  812,  742,  801,  1040, 860,  874,  848,  890,  744,  749, 838,  1050, 918,
+    986,  797,  923,  975,  815,  1020, 906,  901,  1170, 912,  746,  919,  718,  714, 740};
+
+const cairn::LinearModel<1> level{Matrix<1>(1.0), Matrix<1>(1469.1)};
+const cairn::LinearSensor<1, 1> flow{Matrix<1>(1.0), Matrix<1>(15099.0)};
+
+// Filters the flows, year k only where seen(k); returns the recorder and sums the log-likelihood.
+template <class Seen>
+Recorder<Kalman, Vector<1>> filter_nile(const Gaussian<Vector<1>>& prior, double& likelihood,
+                                        const Seen& seen) {
+  Recorder<Kalman, Vector<1>> recorder(Kalman{}, prior);
+  likelihood = 0.0;
+  for (std::size_t k = 0; k < nile.size(); ++k) {
+    if (seen(k)) {
+      const auto innovation = recorder.update(flow, Vector<1>(nile[k]));
+      REQUIRE(innovation.accepted());
+      likelihood += innovation.log_likelihood();
+    }
+    REQUIRE(recorder.predict(level, 1.0) == Status::accepted);
+  }
+  return recorder;
+}
+
+// Relative agreement to about 12 digits.
+void check_digits(double value, double expected, double tolerance = 1e-12) {
+  CAPTURE(expected);
+  CHECK(std::abs(value - expected) <= tolerance * std::abs(expected));
+}
+
+TEST_SUITE("smoother") {
+  TEST_CASE("kalman: the Nile with a vague prior gives the log-likelihood and predictions of KFAS") {
+    double likelihood = 0.0;
+    const auto recorder =
+        filter_nile({Vector<1>(0.0), Matrix<1>(1e7)}, likelihood, [](std::size_t) { return true; });
+    check_digits(likelihood, -641.585578459415);
+    const double means[] = {1118.31146152424, 1140.10843916351, 1072.31601848875};
+    const double variances[] = {16545.3363906742, 9363.65753088294, 7248.5973780062};
+    for (std::size_t k = 0; k < 3; ++k) {
+      check_digits(recorder.steps()[k].predicted.mean(0), means[k]);
+      check_digits(recorder.steps()[k].predicted.covariance(0), variances[k]);
+    }
+  }
+
+  // An exactly diffuse start is the belief after the first flow: N(1120, 15099).
+  TEST_CASE("smoother: the Nile from a diffuse start gives the smoothed levels of KFAS") {
+    double likelihood = 0.0;
+    const auto recorder = filter_nile({Vector<1>(nile[0]), Matrix<1>(15099.0)}, likelihood,
+                                      [](std::size_t k) { return k != 0; });
+    // the first flow, which fixes the diffuse level, contributes nothing to the diffuse likelihood
+    check_digits(likelihood, -632.545625115673);
+    check_digits(recorder.belief().mean(0), 798.370292608364);
+    check_digits(recorder.belief().covariance(0), 5501.25794180848);
+    const auto path = recorder.smoothed();
+    const double levels[] = {1111.6683191268, 1110.85766462181, 1105.26556731239, 1113.51560159702,
+                             1112.37791287392};
+    for (std::size_t k = 0; k < 5; ++k) check_digits(path[k].mean(0), levels[k]);
+    check_digits(path[49].mean(0), 834.763259103751);
+    check_digits(path[49].covariance(0), 2326.75686981419);
+    check_digits(path[99].mean(0), 798.370292608364);
+    check_digits(path[0].covariance(0), 4032.15794180848);
+    check_digits(path[99].covariance(0), 4032.15794180848);
+  }
+
+  TEST_CASE("smoother: the Nile with two gaps of twenty years") {
+    double likelihood = 0.0;
+    const auto seen = [](std::size_t k) { return k != 0 && !(k >= 20 && k < 40) && !(k >= 60 && k < 80); };
+    const auto recorder = filter_nile({Vector<1>(nile[0]), Matrix<1>(15099.0)}, likelihood, seen);
+    check_digits(likelihood, -380.587062775303);
+    check_digits(recorder.steps()[19].predicted.mean(0), 1026.14155507098);
+    check_digits(recorder.steps()[19].predicted.covariance(0), 5501.29616010727);
+    check_digits(recorder.steps()[39].predicted.covariance(0), 34883.2961601073);
+    const auto path = recorder.smoothed();
+    check_digits(path[29].mean(0), 903.421102958105);
+    check_digits(path[29].covariance(0), 9715.0059024614);
+    check_digits(path[69].mean(0), 837.177323709788);
+    check_digits(path[69].covariance(0), 9715.00554901136);
+  }
+
+  // The smoother's mean maximises the joint density of all states: one least-squares problem.
+  TEST_CASE("smoother: equals batch least squares, and a fixed lag as long as the record") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const cairn_test::LinearProblem<2, 1> p(random);
+    constexpr int steps = 6;
+    constexpr int size = 2 * (steps + 1);
+    Matrix<cairn::dynamic> information = Matrix<cairn::dynamic>::Zero(size, size);
+    Vector<cairn::dynamic> vector = Vector<cairn::dynamic>::Zero(size);
+    const Matrix<2> inverse_q = Eigen::LLT<Matrix<2>>(p.process.covariance).solve(Matrix<2>::Identity());
+    const Matrix<2> inverse_p = Eigen::LLT<Matrix<2>>(p.prior.covariance).solve(Matrix<2>::Identity());
+    information.topLeftCorner<2, 2>() += inverse_p;
+    vector.head<2>() += inverse_p * p.prior.mean;
+    Recorder<Kalman, Vector<2>> recorder(Kalman{}, p.prior);
+    Recorder<cairn::Unscented, Vector<2>> unscented(cairn::Unscented{}, p.prior);
+    for (int k = 1; k <= steps; ++k) {
+      const Vector<1> z(random.normal());
+      REQUIRE(recorder.predict(p.process, 1.0) == Status::accepted);
+      REQUIRE(recorder.update(p.sensor, z).accepted());
+      REQUIRE(unscented.predict(p.process, 1.0) == Status::accepted);
+      REQUIRE(unscented.update(p.sensor, z).accepted());
+      Matrix<2, 4> link;
+      link << -p.process.transition, Matrix<2>::Identity();
+      information.block<4, 4>(2 * k - 2, 2 * k - 2) += link.transpose() * inverse_q * link;
+      const double weight = 1.0 / p.sensor.covariance(0);
+      information.block<2, 2>(2 * k, 2 * k) += weight * p.sensor.design.transpose() * p.sensor.design;
+      vector.segment<2>(2 * k) += weight * z(0) * p.sensor.design.transpose();
+    }
+    const Eigen::LLT<Matrix<cairn::dynamic>> root(information);
+    const Vector<cairn::dynamic> batch = root.solve(vector);
+    const Matrix<cairn::dynamic> covariance = root.solve(Matrix<cairn::dynamic>::Identity(size, size));
+    const auto path = recorder.smoothed();
+    const auto unscented_path = unscented.smoothed();
+    for (int k = 0; k <= steps; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      CHECK((path[i].mean - batch.segment<2>(2 * k)).norm() < 1e-12);
+      CHECK((path[i].covariance - covariance.block<2, 2>(2 * k, 2 * k)).norm() < 1e-12);
+      CHECK((unscented_path[i].mean - path[i].mean).norm() < 1e-12);
+      CHECK((unscented_path[i].covariance - path[i].covariance).norm() < 1e-12);
+    }
+    CHECK((recorder.lagged(steps)->mean - path[0].mean).norm() == 0.0);
+    CHECK_FALSE(recorder.lagged(steps + 1).has_value());
+    recorder.keep_last(2);
+    CHECK((recorder.lagged(2)->mean - path[steps - 2].mean).norm() == 0.0);
+  }
+}
+
+TEST_SUITE("steady_state") {
+  TEST_CASE("steady_state: the gain of MATLAB's Kalman Filter Design example") {
+    Matrix<3> a;
+    a << 1.1269, -0.4940, 0.1129, 1, 0, 0, 0, 1, 0;
+    const Vector<3> b(-0.3832, 0.5919, 0.5191);
+    const Matrix<1, 3> c(1, 0, 0);
+    const auto s = cairn::steady_state<3, 1, double>(a, c, 2.3 * b * b.transpose(), Matrix<1>(1.0));
+    REQUIRE(s.has_value());
+    CHECK((s->gain - Vector<3>(0.534537544168, 0.010133193285, -0.477567888178)).norm() < 1e-11);
+    const Vector<3> updated = s->updated.diagonal();
+    CHECK((updated - Vector<3>(0.534537544168, 1.340111845904, 1.469892758493)).norm() < 1e-11);
+    const auto old = cairn::steady_state<3, 1, double>(a, c, b * b.transpose(), Matrix<1>(1.0));
+    CHECK((old->gain - Vector<3>(0.379797333231, 0.081731727044, -0.257039616493)).norm() < 1e-11);
+  }
+
+  TEST_CASE("steady_state: closed forms of the random walk and of the alpha-beta filter") {
+    const Matrix<1> one(1.0);
+    const auto golden = cairn::steady_state<1, 1, double>(one, one, one, one);
+    CHECK(std::abs(golden->gain(0) - (std::sqrt(5.0) - 1) / 2) < 1e-15);
+    // Kalata: T = 1, sigma_w = 0.5 (acceleration), sigma_v = 2
+    Matrix<2> f;
+    f << 1, 1, 0, 1;
+    const Vector<2> g(0.5, 1.0);
+    const auto tracker =
+        cairn::steady_state<2, 1, double>(f, Matrix<1, 2>(1, 0), 0.25 * g * g.transpose(), Matrix<1>(4.0));
+    CHECK((tracker->gain - Vector<2>(0.505137226493, 0.175866208648)).norm() < 1e-11);
+  }
+
+  TEST_CASE("steady_state: says so where there is none") {
+    const Matrix<1> one(1.0);
+    CHECK_FALSE(cairn::steady_state<1, 1, double>(2 * one, 0 * one, one, one).has_value());
+    CHECK_FALSE(cairn::steady_state<1, 1, double>(one, one, one, -one).has_value());
+  }
+}
+
+}  // namespace

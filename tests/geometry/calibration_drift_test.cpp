@@ -1,0 +1,150 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include <cairn/core/random.hpp>
+#include <cairn/core/statistics.hpp>
+#include <cairn/geometry/calibration_drift.hpp>
+#include <cairn/geometry/triangulation.hpp>
+
+#include "support/random.hpp"
+#include "support/rigs.hpp"
+
+namespace {
+
+using cairn::CalibrationDrift;
+using cairn::CalibrationHealth;
+using cairn::PixelPair;
+using cairn::SE3;
+using cairn::SO3;
+using cairn::StereoRig;
+using cairn::Vector;
+
+/// One frame's matches seen by `rig`, a share of them wrong.
+std::vector<PixelPair> frame(const StereoRig& rig, cairn::Random& random, std::size_t count = 200,
+                             double wrong = 0) {
+  std::vector<PixelPair> pairs(count);
+  for (PixelPair& pair : pairs) {
+    Vector<4> x = *rig.project(cairn_test::visible_point(rig, random, 1, 10));
+    for (int i = 0; i < 4; ++i) x(i) += random.normal(0, 0.5);
+    if (random.uniform() < wrong) x(3) += random.uniform(-100, 100);
+    pair = {x.head<2>(), x.tail<2>()};
+  }
+  return pairs;
+}
+
+/// `rig` with its right camera turned by w.
+StereoRig turned(StereoRig rig, const Vector<3>& w) {
+  rig.T_left_right = rig.T_left_right * SE3(SO3::exp(w), Vector<3>::Zero());
+  return rig;
+}
+
+Vector<3> rotation_error(const StereoRig& found, const StereoRig& truth) {
+  return (truth.T_left_right.rotation().inverse() * found.T_left_right.rotation()).log();
+}
+
+}  // namespace
+
+TEST_SUITE("calibration_drift") {
+  TEST_CASE("CalibrationDrift: corrects a step of the pitch within ten frames, on any rig") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    for (const StereoRig& nominal : {cairn_test::rectified_rig(), cairn_test::unrectified_rig()})
+      for (const double step : {0.001, 0.01}) {  // 1 and 10 pixels
+        CAPTURE(step);
+        const StereoRig truth = turned(nominal, Vector<3>(step, 0, step / 2));
+        CalibrationDrift drift(nominal);
+        for (int k = 0; k < 5; ++k) (void)drift.update(frame(nominal, random));
+        CalibrationHealth health;
+        for (int k = 0; k < 10; ++k) health = drift.update(frame(truth, random, 200, 0.1));
+        const Vector<3> error = rotation_error(drift.corrected(), truth);
+        CHECK(std::abs(error(0)) < 1e-4);
+        CHECK(std::abs(error(2)) < 3e-4);
+        CHECK(health.healthy);
+        CHECK(health.distance_after < 1);  // noise alone gives 0.5 sqrt 2
+      }
+  }
+
+  TEST_CASE("CalibrationDrift: its covariance is right, for the well and the badly seen numbers") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const StereoRig nominal = cairn_test::rectified_rig();
+    cairn::CalibrationDriftOptions options;
+    options.walk_rotation = options.walk_baseline = 0;
+    options.gate = 10;
+    constexpr int runs = 60;
+    double nees = 0;
+    for (int run = 0; run < runs; ++run) {
+      Vector<5> truth;
+      for (int i = 0; i < 5; ++i) truth(i) = random.normal(0, options.initial_sigma);
+      StereoRig rig = turned(nominal, truth.head<3>());
+      const Vector<3> t(1, truth(3), truth(4));  // u1, u2, u3 are x, y, z here
+      rig.T_left_right = SE3(rig.T_left_right.rotation(), nominal.baseline() * t / t.norm());
+      CalibrationDrift drift(nominal, options);
+      for (int k = 0; k < 5; ++k) (void)drift.update(frame(rig, random, 100));
+      const Vector<5> error = drift.state() - truth;
+      nees += error.dot(drift.covariance().llt().solve(error)) / runs;
+      // pitch is seen ten times better than yaw, and the filter knows
+      CHECK(drift.covariance()(0, 0) * 10 < drift.covariance()(1, 1));
+    }
+    CAPTURE(nees);
+    CHECK(cairn::chi_square_mean_band(5, runs, 0.999).contains(nees));
+  }
+
+  TEST_CASE(
+      "CalibrationDrift: without drift the correction stays within its own sigmas and depth stays good") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const StereoRig rig = cairn_test::rectified_rig();
+    CalibrationDrift drift(rig);
+    for (int k = 0; k < 50; ++k) CHECK(drift.update(frame(rig, random, 200, 0.1)).healthy);
+    for (int i = 0; i < 5; ++i) CHECK(std::abs(drift.state()(i)) < 4 * std::sqrt(drift.covariance()(i, i)));
+    const StereoRig corrected = drift.corrected();
+    CHECK(std::abs(rotation_error(corrected, rig)(0)) < 1e-4);
+    CHECK(corrected.baseline() == doctest::Approx(rig.baseline()).epsilon(1e-12));
+  }
+
+  TEST_CASE("CalibrationDrift: switched off, it changes nothing and still reports health") {
+    cairn::Random random(cairn_test::seed());
+    const StereoRig nominal = cairn_test::unrectified_rig(), truth = turned(nominal, Vector<3>(0.004, 0, 0));
+    CalibrationDrift drift(nominal, {.enabled = false});
+    const CalibrationHealth health = drift.update(frame(truth, random));
+    CHECK((drift.corrected().T_left_right.matrix().array() == nominal.T_left_right.matrix().array()).all());
+    CHECK(drift.state().norm() == 0.0);
+    CHECK(health.distance_after > 3);
+    CHECK_FALSE(health.healthy);
+  }
+
+  TEST_CASE("CalibrationDrift: follows a slow drift of pitch and roll") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const StereoRig nominal = cairn_test::rectified_rig();
+    CalibrationDrift drift(nominal);
+    double worst = 0;
+    for (int k = 0; k < 200; ++k) {
+      const StereoRig truth = turned(nominal, Vector<3>(2e-5 * k, 0, -1e-5 * k));
+      (void)drift.update(frame(truth, random));
+      if (k > 10) worst = std::max(worst, std::abs(rotation_error(drift.corrected(), truth)(0)));
+    }
+    CHECK(worst < 2.5e-4);  // a quarter of a pixel; the drift is four pixels
+  }
+
+  TEST_CASE("CalibrationDrift: frames without pairs or with impossible pixels are harmless") {
+    const StereoRig rig = cairn_test::unrectified_rig();
+    CalibrationDrift drift(rig);
+    CHECK(drift.update({}).used == 0);
+    const std::vector<PixelPair> bad{{Vector<2>(NAN, 0), Vector<2>(0, 0)},
+                                     {Vector<2>(1e9, 0), Vector<2>(0, 1e9)}};
+    CHECK(drift.update(bad).used == 0);
+    CHECK(drift.state().norm() == 0.0);
+    CHECK(drift.covariance().allFinite());
+  }
+}

@@ -1,0 +1,124 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include <cairn/core/random.hpp>
+#include <cairn/core/statistics.hpp>
+#include <cairn/geometry/robust_alignment.hpp>
+
+#include "support/random.hpp"
+#include "support/rigs.hpp"
+
+namespace {
+
+using cairn::align_robustly;
+using cairn::Matrix;
+using cairn::PointMatch;
+using cairn::RobustAlignment;
+using cairn::RobustAlignmentStatus;
+using cairn::SE3;
+using cairn::Vector;
+
+Vector<3> normal3(cairn::Random& random) {
+  return {random.normal(), random.normal(), random.normal()};
+}
+
+/// Pairs with anisotropic noise in both frames, the first `outliers` of 100 wrong.
+std::vector<PointMatch> pairs(const SE3& T, std::size_t outliers, cairn::Random& random,
+                              std::size_t count = 100) {
+  std::vector<PointMatch> result(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    PointMatch& pair = result[i];
+    const Vector<3> x = 3 * normal3(random);
+    const Vector<3> a = 0.02 * normal3(random), b = 0.01 * normal3(random);
+    pair.source_covariance = a * a.transpose() + 1e-4 * Matrix<3>::Identity();
+    pair.target_covariance = b * b.transpose() + 4e-4 * Matrix<3>::Identity();
+    pair.source = x + random.normal() * a + 0.01 * normal3(random);
+    pair.target = T * x + random.normal() * b + 0.02 * normal3(random);
+    if (i < outliers) pair.target = 3 * normal3(random);
+  }
+  return result;
+}
+
+}  // namespace
+
+TEST_SUITE("robust_alignment") {
+  TEST_CASE("align_robustly: the covariance passes the NEES test, clean and with 40 percent of wrong pairs") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    for (const std::size_t outliers : {0U, 40U}) {
+      constexpr int runs = 200;
+      double nees = 0;
+      for (int run = 0; run < runs; ++run) {
+        const SE3 T = cairn_test::random_pose(random);
+        const RobustAlignment a = align_robustly(pairs(T, outliers, random));
+        REQUIRE(a.good());
+        const Vector<6> error = cairn::local(T, a.T_target_source);
+        nees += error.dot(a.information * error) / runs;
+        CHECK(a.inlier_count >= 90 - outliers);
+      }
+      CAPTURE(nees);
+      CHECK(cairn::chi_square_mean_band(6, runs, 0.999).contains(nees));
+    }
+  }
+
+  TEST_CASE("align_robustly: finds the motion among 80 percent of wrong pairs") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    for (int run = 0; run < 20; ++run) {
+      const SE3 T = cairn_test::random_pose(random);
+      const RobustAlignment a = align_robustly(pairs(T, 80, random));
+      REQUIRE(a.good());
+      CHECK(cairn::local(T, a.T_target_source).norm() < 0.1);
+    }
+  }
+
+  TEST_CASE("align_robustly: gives the same bits twice") {
+    cairn::Random random(cairn_test::seed());
+    const auto data = pairs(cairn_test::random_pose(random), 50, random);
+    const RobustAlignment a = align_robustly(data), b = align_robustly(data);
+    CHECK((a.T_target_source.matrix().array() == b.T_target_source.matrix().array()).all());
+    CHECK(a.inliers == b.inliers);
+  }
+
+  TEST_CASE("align_robustly: says when there are too few, no consensus, or a line") {
+    cairn::Random random(cairn_test::seed());
+    CHECK(align_robustly({}).status == RobustAlignmentStatus::too_few_pairs);
+    CHECK(align_robustly(pairs(SE3(), 0, random, 2)).status == RobustAlignmentStatus::too_few_pairs);
+    CHECK(align_robustly(pairs(SE3(), 100, random)).status == RobustAlignmentStatus::no_consensus);
+    auto mirrored = pairs(SE3(), 0, random);
+    for (PointMatch& pair : mirrored) pair.target(0) = -pair.target(0);
+    CHECK_FALSE(align_robustly(mirrored).good());
+    std::vector<PointMatch> line(20);
+    for (std::size_t i = 0; i < line.size(); ++i)
+      line[i].source = line[i].target = Vector<3>::Constant(static_cast<double>(i));
+    CHECK_FALSE(align_robustly(line).good());
+    std::vector<PointMatch> place(20);
+    CHECK_FALSE(align_robustly(place).good());
+    auto uncertain =
+        pairs(SE3(), 0, random);  // a covariance that is no covariance says nothing, and breaks nothing
+    for (std::size_t i = 0; i < 30; ++i) uncertain[i].target_covariance = -Matrix<3>::Identity();
+    const RobustAlignment a = align_robustly(uncertain);
+    CHECK(a.good());
+    CHECK(a.inliers[0] == 0);
+  }
+
+  TEST_CASE("align_robustly: names the pair that is not finite") {
+    cairn::Random random(cairn_test::seed());
+    auto data = pairs(SE3(), 0, random);
+    data[42].source(1) = NAN;
+    std::string message;
+    try {
+      (void)align_robustly(data);
+    } catch (const cairn::Error& error) {
+      message = error.what();
+    }
+    CHECK(message.find("pair 42") != std::string::npos);
+  }
+}

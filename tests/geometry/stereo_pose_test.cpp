@@ -1,0 +1,399 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include <cairn/core/random.hpp>
+#include <cairn/core/statistics.hpp>
+#include <cairn/geometry/stereo_pose.hpp>
+#include <cairn/manifold/jacobian.hpp>
+
+#include "support/random.hpp"
+#include "support/rigs.hpp"
+
+namespace {
+
+using cairn::estimate_stereo_pose;
+using cairn::Matrix;
+using cairn::PosePrior;
+using cairn::SE3;
+using cairn::StereoMatch;
+using cairn::StereoPose;
+using cairn::StereoPoseOptions;
+using cairn::StereoPoseStatus;
+using cairn::StereoRig;
+using cairn::Vector;
+using cairn_test::random_matches;
+using cairn_test::random_pose;
+using cairn_test::Scene;
+
+constexpr double degree = M_PI / 180;
+
+/// Root mean square errors, and the mean NEES, of many runs.
+struct Accuracy {
+  double metres = 0, degrees = 0, nees = 0;
+  int lost = 0;
+};
+
+Accuracy measure(const StereoRig& rig, const Scene& scene, const StereoPoseOptions& options, int runs,
+                 cairn::Random& random) {
+  Accuracy result;
+  for (int run = 0; run < runs; ++run) {
+    const SE3 T = random_pose(random);
+    const StereoPose pose = estimate_stereo_pose(rig, random_matches(rig, T, scene, random), options);
+    if (!pose.good()) {
+      ++result.lost;
+      continue;
+    }
+    const Vector<6> error = cairn::local(T, pose.T_world_camera);
+    result.metres += error.head<3>().squaredNorm();
+    result.degrees += error.tail<3>().squaredNorm();
+    result.nees += error.dot(pose.information * error);
+  }
+  const int good = std::max(1, runs - result.lost);
+  result.metres = std::sqrt(result.metres / good);
+  result.degrees = std::sqrt(result.degrees / good) / degree;
+  result.nees /= good;
+  return result;
+}
+
+/// Nothing that is not finite, whatever the verdict; a covariance where it is good.
+void check_sound(const StereoPose& pose, std::size_t matches) {
+  CHECK(pose.T_world_camera.matrix().allFinite());
+  CHECK(pose.covariance.allFinite());
+  CHECK(pose.information.allFinite());
+  CHECK(pose.inliers.size() == matches);
+}
+
+}  // namespace
+
+TEST_SUITE("stereo_pose") {
+  TEST_CASE("estimate_stereo_pose: exact observations give the pose to rounding, distorted rig or not") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    for (const StereoRig& rig : {cairn_test::rectified_rig(), cairn_test::unrectified_rig()})
+      for (const double outliers : {0.0, 0.4}) {
+        const SE3 T = random_pose(random);
+        const auto matches = random_matches(rig, T, {.pixel_sigma = 0, .outliers = outliers}, random);
+        const StereoPose pose = estimate_stereo_pose(rig, matches);
+        REQUIRE(pose.good());
+        CHECK(cairn::local(T, pose.T_world_camera).norm() < 1e-11);
+        CHECK(pose.inlier_count >= (outliers == 0 ? 150 : 70));
+        CHECK((pose.covariance * pose.information - Matrix<6>::Identity()).norm() < 1e-6);
+      }
+  }
+
+  TEST_CASE(
+      "estimate_stereo_pose: simulated room, thesis camera: 1 mm, 0.02 degrees, and 4 mm among outliers") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const StereoRig rig = cairn_test::rectified_rig();
+    const Accuracy clean = measure(rig, {}, {}, 200, random);
+    CHECK(clean.lost == 0);
+    CHECK(clean.metres < 0.001);
+    CHECK(clean.degrees < 0.02);
+    const Accuracy wrong = measure(rig, {.outliers = 0.3}, {}, 200, random);
+    CHECK(wrong.lost == 0);
+    CHECK(wrong.metres < 0.004);
+  }
+
+  TEST_CASE("estimate_stereo_pose: the covariance passes the NEES test for every loss, map error and rig") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    constexpr int runs = 300;
+    const auto band = cairn::chi_square_mean_band(6, runs, 0.9999);  // twelve are tested
+    for (const StereoRig& rig : {cairn_test::rectified_rig(), cairn_test::unrectified_rig()})
+      for (const cairn::RobustLoss loss :
+           {cairn::RobustLoss::none, cairn::RobustLoss::huber, cairn::RobustLoss::cauchy})
+        for (const double map_error : {0.0, 0.01}) {
+          CAPTURE(static_cast<int>(loss));
+          CAPTURE(map_error);
+          const Accuracy a = measure(rig, {.landmark_sigma = map_error, .outliers = 0.2},
+                                     {.loss = loss, .loss_scale = 2}, runs, random);
+          CHECK(a.lost == 0);
+          CAPTURE(a.nees);
+          CHECK(band.contains(a.nees));
+        }
+  }
+
+  TEST_CASE("estimate_stereo_pose: survives 60 percent of wrong matches, in either order") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const Scene scene{.matches = 200, .landmark_sigma = 0.005, .outliers = 0.6};
+    for (const auto order : {cairn::SamplingOrder::uniform, cairn::SamplingOrder::progressive}) {
+      StereoPoseOptions options;
+      options.ransac.order = order;
+      const Accuracy a = measure(cairn_test::rectified_rig(), scene, options, 100, random);
+      CHECK(a.lost == 0);
+      CHECK(a.metres < 0.01);
+    }
+  }
+
+  TEST_CASE("estimate_stereo_pose: landmarks with large covariance count less than those without") {
+    cairn::Random random(cairn_test::seed());
+    const StereoRig rig = cairn_test::rectified_rig();
+    double weighted = 0, ignorant = 0;
+    for (int run = 0; run < 50; ++run) {
+      const SE3 T = random_pose(random);
+      auto matches = random_matches(rig, T, {.matches = 60}, random);
+      for (std::size_t i = 0; i < 40; ++i) {  // most landmarks are 3 cm off along one axis, and say so
+        const Vector<3> axis(0.6, 0, 0.8);
+        matches[i].landmark += random.normal(0, 0.03) * axis;
+        matches[i].covariance = 9e-4 * axis * axis.transpose();
+      }
+      weighted += cairn::local(T, estimate_stereo_pose(rig, matches).T_world_camera).squaredNorm();
+      for (auto& match : matches) match.covariance = Matrix<3>::Identity() * 3e-4;
+      ignorant += cairn::local(T, estimate_stereo_pose(rig, matches).T_world_camera).squaredNorm();
+    }
+    CHECK(weighted < 0.7 * ignorant);
+  }
+
+  TEST_CASE("estimate_stereo_pose: the same seed gives the same bits") {
+    cairn::Random random(cairn_test::seed());
+    const StereoRig rig = cairn_test::unrectified_rig();
+    const auto matches = random_matches(rig, random_pose(random), {.outliers = 0.5}, random);
+    const StereoPose a = estimate_stereo_pose(rig, matches), b = estimate_stereo_pose(rig, matches);
+    CHECK((a.T_world_camera.matrix().array() == b.T_world_camera.matrix().array()).all());
+    CHECK((a.covariance.array() == b.covariance.array()).all());
+    CHECK(a.inliers == b.inliers);
+    CHECK(a.iterations == b.iterations);
+  }
+
+  TEST_CASE("estimate_stereo_pose: a prior with information shifts the estimate as Bayes says") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const StereoRig rig = cairn_test::rectified_rig();
+    constexpr int runs = 300;
+    const double spread = 0.002;
+    double nees = 0, with = 0, without = 0;
+    for (int run = 0; run < runs; ++run) {
+      const SE3 T = random_pose(random);
+      const auto matches = random_matches(rig, T, {.matches = 20}, random);
+      Vector<6> error;
+      for (int i = 0; i < 6; ++i) error(i) = random.normal(0, spread);
+      const PosePrior prior{cairn::retract(T, Vector<6>(-error)), Matrix<6>::Identity() / (spread * spread)};
+      const StereoPose pose = estimate_stereo_pose(rig, matches, {}, prior);
+      REQUIRE(pose.good());
+      const Vector<6> left = cairn::local(T, pose.T_world_camera);
+      nees += left.dot(pose.information * left) / runs;
+      with += left.squaredNorm();
+      without += cairn::local(T, estimate_stereo_pose(rig, matches).T_world_camera).squaredNorm();
+    }
+    CHECK(cairn::chi_square_mean_band(6, runs, 0.999).contains(nees));
+    CHECK(with < without);
+  }
+
+  TEST_CASE("estimate_stereo_pose: a prior without information is one more hypothesis and biases nothing") {
+    cairn::Random random(cairn_test::seed());
+    const StereoRig rig = cairn_test::rectified_rig();
+    const SE3 T = random_pose(random);
+    const auto matches = random_matches(rig, T, {.outliers = 0.3}, random);
+    const StereoPose plain = estimate_stereo_pose(rig, matches);
+    const PosePrior wrong{random_pose(random, 3), Matrix<6>::Zero()};
+    const StereoPose guided = estimate_stereo_pose(rig, matches, {}, wrong);
+    CHECK(cairn::local(plain.T_world_camera, guided.T_world_camera).norm() < 1e-5);
+    // and with a near guess no sample is needed
+    StereoPoseOptions no_samples;
+    no_samples.ransac.max_iterations = 0;
+    const PosePrior near{cairn::retract(T, Vector<6>(Vector<6>::Constant(0.02))), Matrix<6>::Zero()};
+    const StereoPose direct = estimate_stereo_pose(rig, matches, no_samples, near);
+    REQUIRE(direct.good());
+    CHECK(cairn::local(plain.T_world_camera, direct.T_world_camera).norm() < 1e-5);
+  }
+
+  TEST_CASE("refine_stereo_pose: gets to the same optimum from a pose nearby") {
+    cairn::Random random(cairn_test::seed());
+    const StereoRig rig = cairn_test::unrectified_rig();
+    const SE3 T = random_pose(random);
+    const auto matches = random_matches(rig, T, {.landmark_sigma = 0.01, .outliers = 0.2}, random);
+    const StereoPose full = estimate_stereo_pose(rig, matches);
+    const StereoPose refined =
+        cairn::refine_stereo_pose(rig, matches, cairn::retract(T, Vector<6>(Vector<6>::Constant(0.003))));
+    REQUIRE(refined.good());
+    CHECK(cairn::local(full.T_world_camera, refined.T_world_camera).norm() < 1e-5);
+    CHECK(refined.inliers == full.inliers);
+  }
+
+  TEST_CASE("estimate_stereo_pose: landmarks a million metres from the origin cost no accuracy") {
+    cairn::Random random(cairn_test::seed());
+    const StereoRig rig = cairn_test::rectified_rig();
+    const SE3 far(cairn::SO3::exp(Vector<3>(0.1, 0.2, 0.3)), Vector<3>(1e6, -1e6, 1e6));
+    const auto matches = random_matches(rig, far, {.outliers = 0.3}, random);
+    const StereoPose pose = estimate_stereo_pose(rig, matches);
+    REQUIRE(pose.good());
+    CHECK(cairn::local(far, pose.T_world_camera).head<3>().norm() < 0.004);
+  }
+
+  TEST_CASE("estimate_stereo_pose: a right row that repeats the left one is not counted twice") {
+    cairn::Random random(cairn_test::seed());
+    const StereoRig rig = cairn_test::rectified_rig();
+    constexpr int runs = 300;
+    StereoPoseOptions tracked;
+    tracked.right_rows = false;
+    double nees = 0;
+    for (int run = 0; run < runs; ++run) {
+      const SE3 T = random_pose(random);
+      auto matches = random_matches(rig, T, {}, random);
+      for (StereoMatch& match : matches) match.right(1) = match.left(1);
+      const StereoPose pose = estimate_stereo_pose(rig, matches, tracked);
+      REQUIRE(pose.good());
+      const Vector<6> error = cairn::local(T, pose.T_world_camera);
+      nees += error.dot(pose.information * error) / runs;
+    }
+    CHECK(cairn::chi_square_mean_band(6, runs, 0.999).contains(nees));
+  }
+
+  TEST_CASE("stereo residual: gradient and information are the derivatives of chi squared") {
+    cairn::Random random(cairn_test::seed());
+    const StereoRig rig = cairn_test::unrectified_rig();
+    const SE3 T = random_pose(random);
+    for (const double map_error : {0.0, 0.02}) {
+      const auto matches = random_matches(rig, T, {.matches = 40, .landmark_sigma = map_error}, random);
+      StereoPoseOptions options;
+      options.loss = cairn::RobustLoss::none;
+      options.gate_probability = 0.999999;
+      const cairn::detail::StereoPoseProblem problem(rig, matches, options, std::nullopt);
+      // at the optimum of the sum of chi^2, a step raises it by d^T information d, to second order
+      const StereoPose pose = cairn::refine_stereo_pose(rig, matches, T, options);
+      REQUIRE(pose.good());
+      const double least = problem.score(pose.T_world_camera, 1e300).cost;
+      for (int i = 0; i < 6; ++i) {
+        Vector<6> d = Vector<6>::Zero();
+        d(i) = 0.5 / std::sqrt(pose.information(i, i));
+        const double up = problem.score(cairn::retract(pose.T_world_camera, d), 1e300).cost;
+        const double down = problem.score(cairn::retract(pose.T_world_camera, Vector<6>(-d)), 1e300).cost;
+        CHECK(0.5 * (up + down) - least == doctest::Approx(0.25).epsilon(0.1));
+        // with a map error the residuals' covariance moves with the pose, which a likelihood must not exploit
+        if (map_error == 0) CHECK(std::abs(up - down) < 0.01);
+      }
+    }
+  }
+
+  TEST_CASE("stereo pose score: stops early only with a cost above the limit, for every number of matches") {
+    cairn::Random random(cairn_test::seed());
+    const StereoRig rig = cairn_test::rectified_rig();
+    for (std::size_t count = 20; count < 30; ++count) {
+      const SE3 T = random_pose(random);
+      const auto matches = random_matches(rig, T, {.matches = count, .outliers = 0.5}, random);
+      const cairn::detail::StereoPoseProblem problem(rig, matches, {}, std::nullopt);
+      const double cost = problem.score(T, 1e300).cost;
+      std::vector<std::uint8_t> mask(count);
+      problem.inliers(T, mask);
+      CHECK(problem.score(T, 1e300).inliers ==
+            static_cast<std::size_t>(std::count(mask.begin(), mask.end(), std::uint8_t{1})));
+      for (double limit = 0; limit < 1.2 * cost; limit += 3) {
+        const double found = problem.score(T, limit).cost;
+        if (cost > limit) CHECK(found > limit);
+        if (cost <= limit) CHECK(found == cost);
+      }
+    }
+  }
+
+  TEST_CASE("estimate_stereo_pose: too few, wrong, coincident or collinear matches get a verdict") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const StereoRig rig = cairn_test::rectified_rig();
+    const SE3 T = random_pose(random);
+    for (const std::size_t count : {0U, 1U, 2U, 3U, 7U}) {
+      const StereoPose pose = estimate_stereo_pose(rig, random_matches(rig, T, {.matches = count}, random));
+      CHECK(pose.status == StereoPoseStatus::too_few_matches);
+      check_sound(pose, count);
+    }
+    const auto place = [&](const auto& landmark) {
+      std::vector<StereoMatch> matches(50);
+      for (std::size_t i = 0; i < matches.size(); ++i) {
+        const Vector<3> p = landmark(static_cast<double>(i));
+        matches[i].landmark = T * p;
+        const Vector<4> pixels = *rig.project(p);
+        matches[i].left = pixels.head<2>();
+        matches[i].right = pixels.tail<2>();
+      }
+      const StereoPose pose = estimate_stereo_pose(rig, matches);
+      check_sound(pose, matches.size());
+      CHECK_FALSE(pose.good());
+    };
+    place([](double) { return Vector<3>(0.1, 0.2, 4); });
+    place([](double i) { return Vector<3>(0.1 + 0.01 * i, 0.2, 4 + 0.03 * i); });
+  }
+
+  TEST_CASE("estimate_stereo_pose: matches that are all wrong give no consensus") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const StereoRig rig = cairn_test::rectified_rig();
+    for (const std::size_t count : {20U, 100U, 500U})
+      for (int run = 0; run < 10; ++run) {
+        const auto matches =
+            random_matches(rig, random_pose(random), {.matches = count, .outliers = 1}, random);
+        const StereoPose pose = estimate_stereo_pose(rig, matches);
+        CHECK_FALSE(pose.good());
+        check_sound(pose, count);
+      }
+  }
+
+  TEST_CASE("estimate_stereo_pose: a mirrored map is not accepted") {
+    cairn::Random random(cairn_test::seed());
+    const StereoRig rig = cairn_test::rectified_rig();
+    auto matches = random_matches(rig, SE3(), {}, random);
+    for (StereoMatch& match : matches) match.landmark(0) = -match.landmark(0);
+    const StereoPose pose = estimate_stereo_pose(rig, matches);
+    CHECK_FALSE(pose.good());
+    check_sound(pose, matches.size());
+  }
+
+  TEST_CASE("estimate_stereo_pose: refuses numbers that are not finite and names the match") {
+    cairn::Random random(cairn_test::seed());
+    const StereoRig rig = cairn_test::rectified_rig();
+    const auto good = random_matches(rig, SE3(), {.matches = 20}, random);
+    const auto message = [&](auto&& spoil) {
+      auto matches = good;
+      spoil(matches[13]);
+      try {
+        (void)estimate_stereo_pose(rig, matches);
+      } catch (const cairn::Error& error) {
+        return std::string(error.what());
+      }
+      return std::string();
+    };
+    CHECK(message([](StereoMatch& m) { m.landmark(2) = NAN; }).find("match 13") != std::string::npos);
+    CHECK(message([](StereoMatch& m) { m.left(0) = INFINITY; }).find("match 13") != std::string::npos);
+    CHECK(message([](StereoMatch& m) { m.right(1) = NAN; }).find("match 13") != std::string::npos);
+    CHECK(message([](StereoMatch& m) { m.covariance(0, 1) = NAN; }).find("match 13") != std::string::npos);
+    CHECK(message([](StereoMatch& m) { m.covariance(0, 0) = -1; }).find("match 13") != std::string::npos);
+    CHECK(message([](StereoMatch& m) { m.sigma_left = 0; }).find("match 13") != std::string::npos);
+  }
+
+  TEST_CASE("estimate_stereo_pose: finite numbers of any size never give anything but finite numbers") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const StereoRig rig = cairn_test::unrectified_rig();
+    for (int run = 0; run < 100; ++run) {
+      std::vector<StereoMatch> matches(30);
+      for (StereoMatch& m : matches) {
+        const double size = std::pow(10, random.uniform(-3, 6));
+        for (int i = 0; i < 3; ++i) m.landmark(i) = size * random.normal();
+        for (int i = 0; i < 2; ++i) {
+          m.left(i) = 1000 * random.normal();
+          m.right(i) = 1000 * random.normal();
+        }
+        m.covariance = Matrix<3>::Identity() * std::pow(10, random.uniform(-12, 12));
+      }
+      StereoPoseOptions options;
+      options.ransac.max_iterations = 100;
+      check_sound(estimate_stereo_pose(rig, matches, options), matches.size());
+    }
+  }
+}

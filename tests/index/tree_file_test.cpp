@@ -1,0 +1,87 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include <cairn/index/tree_file.hpp>
+
+#include "index/generators.hpp"
+#include "support/folder.hpp"
+#include "support/random.hpp"
+
+namespace {
+
+using Tree = cairn::KdTree<float, 3>;
+
+std::string saved(const Tree& tree) {
+  std::ostringstream out;
+  cairn::save_tree(out, tree);
+  return out.str();
+}
+
+template <class T = Tree>
+std::string refusal(const std::string& bytes) {
+  return cairn_test::message_of([&] {
+    std::istringstream in(bytes);
+    static_cast<void>(cairn::load_tree<T>(in, "a.tree"));
+  });
+}
+
+Tree make_tree(std::size_t count) {
+  cairn::Random random(7);
+  const auto numbers = cairn_test::make_points<float>("uniform", count, 3, random);
+  std::vector<cairn::PointId> ids;
+  for (std::size_t i = 0; i < count; ++i) ids.push_back(static_cast<cairn::PointId>(3 * i + 5));
+  return Tree(cairn::Rows<float>(numbers, 3), ids);
+}
+
+}  // namespace
+
+TEST_SUITE("tree_file") {
+  TEST_CASE("tree_file: a loaded tree answers with the ids and distances of the saved one") {
+    for (const std::size_t count : {std::size_t{1}, std::size_t{17}, std::size_t{2000}}) {
+      const Tree tree = make_tree(count);
+      std::istringstream in(saved(tree));
+      const Tree loaded = cairn::load_tree<Tree>(in, "memory");
+      REQUIRE(loaded.size() == count);
+      cairn::Random random(3);
+      for (int i = 0; i < 50; ++i) {
+        const auto query = cairn_test::make_points<float>("uniform", 1, 3, random);
+        CHECK(loaded.nearest(query, 5) == tree.nearest(query, 5));
+      }
+    }
+    std::istringstream in(saved(Tree()));
+    CHECK(cairn::load_tree<Tree>(in, "memory").empty());
+  }
+
+  TEST_CASE("tree_file: any byte changed, or the file cut anywhere, is noticed") {
+    const std::string bytes = saved(make_tree(40));
+    for (std::size_t at = 0; at < bytes.size(); ++at) {
+      CAPTURE(at);
+      std::string damaged = bytes;
+      damaged[at] = static_cast<char>(damaged[at] ^ 0x10);
+      CHECK(refusal(damaged).find("a.tree: ") == 0);
+      CHECK(refusal(bytes.substr(0, at)).find("a.tree: ") == 0);
+    }
+  }
+
+  TEST_CASE("tree_file: what is foreign is refused by what it is") {
+    const std::string bytes = saved(make_tree(40));
+    CHECK(refusal("PLY").find("not a cairn tree file") != std::string::npos);
+    std::string newer = bytes;
+    newer[8] = 2;
+    CHECK(refusal(newer).find("version 2 of the tree format, expected 1") != std::string::npos);
+    CHECK(refusal<cairn::KdTree<double, 3>>(bytes).find("coordinates of 4 bytes, expected 8") !=
+          std::string::npos);
+    CHECK(refusal<cairn::KdTree<float, 2>>(bytes).find("dimension 3, expected 2") != std::string::npos);
+    std::string promising = bytes.substr(0, 60);
+    promising[27] = static_cast<char>(0x7f);  // two thousand million points, and 20 bytes of them
+    CHECK(refusal(promising).find("ends early") != std::string::npos);
+  }
+}

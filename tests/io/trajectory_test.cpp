@@ -1,0 +1,194 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <clocale>
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <string>
+
+#include <doctest/doctest.h>
+
+#include <cairn/core/random.hpp>
+#include <cairn/io/trajectory.hpp>
+
+#include "support/data.hpp"
+#include "support/folder.hpp"
+#include "support/random.hpp"
+
+using cairn::SE3;
+using cairn::SO3;
+using cairn::Trajectory;
+using cairn::Vector;
+using cairn_test::Folder;
+using cairn_test::message_of;
+
+namespace {
+
+Trajectory random_trajectory(cairn::Random& random, std::size_t count) {
+  Trajectory trajectory;
+  for (std::size_t i = 0; i < count; ++i) {
+    const Vector<3> position(random.normal() * 1e3, random.normal(), random.normal() * 1e-6);
+    trajectory.push_back(
+        {1403715524.5 + 0.1 * static_cast<double>(i) + 0.05 * random.uniform(),
+         SE3(SO3::from_quaternion(random.normal(), random.normal(), random.normal(), random.normal()),
+             position)});
+  }
+  return trajectory;
+}
+
+double difference(const SE3& a, const SE3& b) {
+  return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff();
+}
+
+}  // namespace
+
+TEST_SUITE("trajectory") {
+  TEST_CASE("trajectory: TUM, KITTI and EuRoC files read back what was written") {
+    const std::uint64_t seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const Trajectory written = random_trajectory(random, 200);
+    const Folder folder;
+    cairn::write_tum(folder / "a.tum", written);
+    cairn::write_kitti(folder / "a.kitti", written);
+    cairn::write_euroc(folder / "a.csv", written);
+    const Trajectory tum = cairn::read_tum(folder / "a.tum");
+    const Trajectory kitti = cairn::read_kitti(folder / "a.kitti");
+    const Trajectory euroc = cairn::read_euroc(folder / "a.csv");
+    REQUIRE(tum.size() == written.size());
+    REQUIRE(kitti.size() == written.size());
+    REQUIRE(euroc.size() == written.size());
+    for (std::size_t i = 0; i < written.size(); ++i) {
+      CHECK(tum[i].time == written[i].time);  // to the bit
+      CHECK((tum[i].T_world_body.translation() == written[i].T_world_body.translation()));
+      CHECK(kitti[i].time == static_cast<double>(i));
+      CHECK((kitti[i].T_world_body.translation() == written[i].T_world_body.translation()));
+      CHECK(std::abs(euroc[i].time - written[i].time) < 3e-7);
+      for (const Trajectory* read : {&tum, &kitti, &euroc})
+        CHECK(difference((*read)[i].T_world_body, written[i].T_world_body) < 1e-14);
+    }
+  }
+
+  TEST_CASE("trajectory: the same poses give the same bytes, whatever the locale") {
+    cairn::Random random(3);
+    const Trajectory trajectory = random_trajectory(random, 20);
+    const Folder folder;
+    cairn::write_tum(folder / "a", trajectory);
+    const bool other = std::setlocale(LC_ALL, "de_DE.UTF-8") != nullptr;
+    cairn::write_tum(folder / "b", trajectory);
+    const Trajectory back = cairn::read_tum(folder / "a");
+    if (other) std::setlocale(LC_ALL, "C");
+    CHECK(cairn::read_file(folder / "a") == cairn::read_file(folder / "b"));
+    CHECK(back.size() == trajectory.size());
+    const auto entries = std::filesystem::directory_iterator(folder.path());
+    CHECK(std::distance(begin(entries), end(entries)) == 2);  // no temporary is left
+  }
+
+  TEST_CASE("trajectory: comments, blank lines, CR LF, tabs and a missing last line end are accepted") {
+    const Folder folder;
+    folder.put("a", "# a comment\r\n\r\n1 1 2 3\t0 0  0 1\r\n  2 +4 5e0 6 0 0 0 -1");
+    const Trajectory trajectory = cairn::read_tum(folder / "a");
+    REQUIRE(trajectory.size() == 2);
+    CHECK((trajectory[1].T_world_body.translation() == Vector<3>(4, 5, 6)));
+    CHECK(difference(trajectory[1].T_world_body, SE3(SO3(), Vector<3>(4, 5, 6))) == 0);
+  }
+
+  TEST_CASE("trajectory: bad TUM files are refused with file, line and what was expected") {
+    const Folder folder;
+    const auto refusal = [&](const std::string& text) {
+      folder.put("bad.tum", text);
+      return message_of([&] { static_cast<void>(cairn::read_tum(folder / "bad.tum")); });
+    };
+    const std::string good = "1 0 0 0 0 0 0 1\n";
+    CHECK(refusal(good + "2 0 0 0 0 0 0\n").find("bad.tum:2: expected 8 numbers") != std::string::npos);
+    CHECK(refusal(good + "2 0 0 0 0 0 0 1 9\n").find("bad.tum:2: expected 8 numbers") != std::string::npos);
+    CHECK(refusal(good + "2 nan 0 0 0 0 0 1\n").find(":2: expected a finite number in column 2 ('nan'") !=
+          std::string::npos);
+    CHECK(refusal(good + "2 inf 0 0 0 0 0 1\n").find("column 2") != std::string::npos);
+    CHECK(refusal(good + "2 1e999 0 0 0 0 0 1\n").find("column 2") != std::string::npos);
+    CHECK(refusal(good + "2 1,5 0 0 0 0 0 1\n").find("('1,5' is none)") != std::string::npos);
+    CHECK(refusal(good + "2 0 0 0 0.7 0.7 0.7 0.7\n").find("a quaternion of length 1, not 1.4") !=
+          std::string::npos);
+    CHECK(refusal(good + "2 0 0 0 0 0 0 0\n").find("a quaternion of length 1") != std::string::npos);
+    CHECK(refusal(good + "0.5 0 0 0 0 0 0 1\n").find("times that do not run backwards") != std::string::npos);
+    CHECK(refusal("").find("found the end of the file") != std::string::npos);
+    CHECK(refusal("# only a comment\n").find("at least one line") != std::string::npos);
+    CHECK(message_of([&] {
+            static_cast<void>(cairn::read_tum(folder / "absent"));
+          }).find("absent: no such file") != std::string::npos);
+    CHECK(message_of([&] { static_cast<void>(cairn::read_tum(folder.path())); }).find("is a folder") !=
+          std::string::npos);
+  }
+
+  TEST_CASE("trajectory: bad KITTI and EuRoC files are refused with file, line and what was expected") {
+    const Folder folder;
+    const auto kitti = [&](const std::string& text) {
+      folder.put("bad", text);
+      return message_of([&] { static_cast<void>(cairn::read_kitti(folder / "bad")); });
+    };
+    CHECK(kitti("1 0 0 0 0 1 0 0 0 0 1\n").find("bad:1: expected 12 numbers") != std::string::npos);
+    CHECK(kitti("1 0 0 0 0 1 0 0 0 0 2 0\n").find("bad:1: expected a rotation") != std::string::npos);
+    CHECK(kitti("1 0 0 0 0 1 0 0 0 0 -1 0\n").find("reflection") != std::string::npos);
+    CHECK(kitti("# no comments here\n").find("column 1") != std::string::npos);
+    CHECK(kitti("\n").find("at least one line") != std::string::npos);
+    const auto euroc = [&](const std::string& text) {
+      folder.put("bad", text);
+      return message_of([&] { static_cast<void>(cairn::read_euroc(folder / "bad")); });
+    };
+    CHECK(euroc("#h\n1000,0,0,0,1,0,0\n").find("bad:2: expected at least 8 numbers") != std::string::npos);
+    CHECK(euroc("1000,0,0,0,1,0,0,0,7\n2000,0,0,0,1,0,0,0\n").find("bad:2: expected 9 columns") !=
+          std::string::npos);
+    CHECK(euroc("1000,0,0,0,1,0,,0\n").find("column 7 ('' is none)") != std::string::npos);
+    CHECK(euroc("2000,0,0,0,1,0,0,0\n1000,0,0,0,1,0,0,0\n").find("backwards") != std::string::npos);
+  }
+
+  TEST_CASE("trajectory: KITTI times must be one a pose") {
+    const Folder folder;
+    folder.put("poses", "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 1\n");
+    const auto refusal = [&](const std::string& times) {
+      folder.put("times", times);
+      return message_of([&] { static_cast<void>(cairn::read_kitti(folder / "poses", folder / "times")); });
+    };
+    CHECK(refusal("0.0\n0.1\n").empty());
+    CHECK(cairn::read_kitti(folder / "poses", folder / "times")[1].time == 0.1);
+    CHECK(refusal("0.0\n").find("times:1: expected one time for each of the 2 poses") != std::string::npos);
+    CHECK(refusal("0.0\n0.1\n0.2\n").find("times:3: expected no more than 2 times") != std::string::npos);
+    CHECK(refusal("0.1\n0.0\n").find("backwards") != std::string::npos);
+  }
+
+  TEST_CASE("trajectory: a write that fails says so and leaves nothing") {
+    const Folder folder;
+    CHECK(message_of([&] {
+            cairn::write_tum(folder / "none" / "a.tum", {{0, SE3()}});
+          }).find("cannot write") != std::string::npos);
+    std::filesystem::create_directory(folder / "taken");
+    CHECK(message_of([&] { cairn::write_tum(folder / "taken", {{0, SE3()}}); }).find("cannot write") !=
+          std::string::npos);
+    const auto entries = std::filesystem::directory_iterator(folder.path());
+    CHECK(std::distance(begin(entries), end(entries)) == 1);
+  }
+
+  TEST_CASE("trajectory: moved_frame multiplies the body-to-sensor motion on the right") {
+    const SE3 T_world_body(SO3::exp(Vector<3>(0, 0, 1.0)), Vector<3>(1, 2, 3));
+    const SE3 T_body_sensor(SO3::exp(Vector<3>(0.3, 0, 0)), Vector<3>(0.5, 0, 0));
+    const Trajectory moved = cairn::moved_frame({{4.0, T_world_body}}, T_body_sensor);
+    const Vector<3> point(0.1, -0.2, 0.7);
+    CHECK((moved[0].T_world_body * point - T_world_body * (T_body_sensor * point)).norm() < 1e-15);
+    CHECK(moved[0].time == 4.0);
+  }
+
+  TEST_CASE("trajectory: reads every published trajectory of the data folder") {
+    const auto data = cairn_test::real_data("trajectories");
+    if (!data) return;
+    CHECK(cairn::read_kitti(*data / "KITTI_00_gt.txt").size() == 4541);
+    CHECK(cairn::read_kitti(*data / "KITTI_00_ORB.txt").size() == 4541);
+    CHECK(cairn::read_kitti(*data / "KITTI_00_SPTAM.txt").size() == 4541);
+    CHECK(cairn::read_tum(*data / "fr2_desk_ORB.txt").size() == 2893);
+    CHECK(cairn::read_tum(*data / "fr2_desk_groundtruth.txt").size() == 20957);
+    CHECK(cairn::read_tum(*data / "V102.txt").size() == 807);
+    const Trajectory euroc = cairn::read_euroc(*data / "V102_groundtruth.csv");
+    CHECK(euroc.size() == 16702);
+    CHECK(std::abs(euroc[0].time - 1403715524.907143168) < 3e-7);
+  }
+}
