@@ -52,10 +52,11 @@ struct Trial {
     } while (samples.count_inside < options.shape.size());
     const double gain = random.uniform(0.5, 2.0), bias = 100.0 * random.normal();
     for (double& value : samples.value) value = gain * (value + noise * random.normal()) + bias;
-    const PatchPlacement guess =
-        PatchPlacement::of(trial.truth_x + random.uniform(-options.uncertainty, options.uncertainty),
-                           trial.truth_y + random.uniform(-options.uncertainty, options.uncertainty), spacing,
-                           spacing, heading + options.heading_sigma * random.normal());
+    // Drawn one by one: the order in which arguments are evaluated is the compiler's.
+    const double guess_x = trial.truth_x + random.uniform(-options.uncertainty, options.uncertainty);
+    const double guess_y = trial.truth_y + random.uniform(-options.uncertainty, options.uncertainty);
+    const double guess_heading = heading + options.heading_sigma * random.normal();
+    const PatchPlacement guess = PatchPlacement::of(guess_x, guess_y, spacing, spacing, guess_heading);
     // The square of starts, turned to the sensor's axes, lies in a square of 1.42 times its side.
     trial.fix = cairn::correlation_search(map, options.shape, samples.value, guess,
                                           {.radius = std::numbers::sqrt2 * options.uncertainty});

@@ -98,7 +98,8 @@ std::vector<Seen> fly(const FieldGrid& field, const LoopFlight& flight, double s
   const double length = 2.0 * std::numbers::pi * flight.radius;
   const auto frames = static_cast<std::size_t>(length / (flight.velocity * flight.interval)) + 3;
   cairn::Random random(flight.seed, 3);
-  Vector<2> drift(flight.drift_sigma * random.normal(), flight.drift_sigma * random.normal());
+  Vector<2> drift{flight.drift_sigma * random.normal(),
+                  flight.drift_sigma * random.normal()};  // {}: in order
   Vector<2> error = Vector<2>::Zero();
   Reckoning state{
       Vector<4>(1e-6, 1e-6, flight.drift_sigma * flight.drift_sigma, flight.drift_sigma * flight.drift_sigma)
