@@ -12,6 +12,7 @@
 
 #include <doctest/doctest.h>
 
+#include <cairn/index/axis_metrics.hpp>
 #include <cairn/index/brute_force.hpp>
 #include <cairn/index/kd_tree.hpp>
 

@@ -42,6 +42,7 @@ public:
               Work* work = nullptr) {
     queue_.clear();
     turns_.clear();
+    query = wrapped(trees, query);
     Work done;
     std::size_t leaves = 0;
     for (std::size_t i = 0; i < trees.size(); ++i)
@@ -122,12 +123,28 @@ private:
       const Real offset = query[split.axis] - static_cast<Real>(split.value);
       const std::uint32_t near = 2 * cell.slot + (offset < 0 ? 0U : 1U);
       const Real old = offset_along(split.axis, cell.turn);
-      const Real bound = detail::moved_bound(tree.metric(), cell.bound, old, offset, split.axis);
+      const Real across =
+          detail::offset_across(tree.metric(), query[split.axis], static_cast<Real>(split.value), split.axis);
+      const Real bound = detail::moved_bound(tree.metric(), cell.bound, old, across, split.axis);
       if (bound < static_cast<Real>(collector.limit())) {
-        turns_.push_back({offset, split.axis, cell.turn});
+        turns_.push_back({across, split.axis, cell.turn});
         push({bound, cell.tree, cell.depth + 1, near ^ 1U, static_cast<std::uint32_t>(turns_.size() - 1)});
       }
       cell.slot = near;
+    }
+  }
+
+  /// The query with coordinates on circles as the trees hold them.
+  const Real* wrapped(std::span<const Tree* const> trees, const Real* query) {
+    if constexpr (detail::HasPeriods<typename Tree::Measure>) {
+      const auto tree =
+          std::find_if(trees.begin(), trees.end(), [](const Tree* t) { return t != nullptr && !t->empty(); });
+      if (tree == trees.end()) return query;
+      wrapped_.assign(query, query + (*tree)->dimension());
+      detail::wrap_row((*tree)->metric(), wrapped_.size(), wrapped_.data());
+      return wrapped_.data();
+    } else {
+      return query;
     }
   }
 
@@ -141,6 +158,7 @@ private:
   std::vector<Cell> queue_;
   std::vector<Turn> turns_;
   std::vector<Real> row_;
+  std::vector<Real> wrapped_;
 };
 
 }  // namespace cairn::inline CAIRN_ABI

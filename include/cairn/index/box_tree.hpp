@@ -20,6 +20,7 @@
 #include <limits>
 
 #include <cairn/index/leaf_blocks.hpp>
+#include <cairn/index/metric.hpp>
 
 namespace cairn::inline CAIRN_ABI::detail {
 
@@ -132,6 +133,10 @@ private:
       under = under - query[a];
       over = query[a] - over;
       Block<Real> gap = under < over ? over : under;
+      if constexpr (HasPeriods<M>) {  // the other way round to the farther side
+        const Block<Real> other_way = static_cast<Real>(metric.period(a)) + (under < over ? under : over);
+        gap = other_way < gap ? other_way : gap;
+      }
       gap = gap < 0 ? Block<Real>{} : gap;
       accumulate_block<Real>(metric, sums, gap, a);
     }

@@ -33,7 +33,11 @@ public:
   explicit BruteForce(const Points& points, M metric = {})
       : metric_(std::move(metric)),
         dim_(detail::dimension_of<Dim>(points)),
-        rows_(detail::copy_points<Scalar>(points, dim_, "BruteForce: point")) {}
+        rows_(detail::copy_points<Scalar>(points, dim_, "BruteForce: point")) {
+    if (rows_.empty()) return;
+    detail::check_metric(metric_, dim_);
+    if constexpr (detail::HasPeriods<M>) rows_ = detail::wrapped_rows(metric_, dim_, std::move(rows_));
+  }
 
   [[nodiscard]] std::size_t size() const noexcept { return dim_ == 0 ? 0 : rows_.size() / dim_; }
   [[nodiscard]] bool empty() const noexcept { return rows_.empty(); }
@@ -76,6 +80,7 @@ public:
     if (empty()) return;
     std::vector<Real> row(dim_);
     detail::copy_point<Real>(query, dim_, row.data(), {"BruteForce: query", 0});
+    detail::wrap_row(metric_, dim_, row.data());
     for (std::size_t i = 0; i < size(); ++i) {
       Real reduced = 0;
       for (std::size_t a = 0; a < dim_; ++a)

@@ -47,6 +47,7 @@ public:
   using Real = detail::RealOf<Scalar>;
   using Hit = Neighbor<Real>;
   using Coordinate = Scalar;
+  using Measure = M;
   static constexpr std::size_t fixed_dimension = Dim;
   static_assert(Metric<M, Real>, "the third argument of KdTree must satisfy cairn::Metric");
 
@@ -133,6 +134,7 @@ public:
     if (empty()) return;
     detail::Scratch<Real> row(dimension());
     detail::copy_point<Real>(query, dimension(), row.data(), {"KdTree: query", 0});
+    detail::wrap_row(metric_, dimension(), row.data());
     Work done;
     if (use_boxes())
       detail::with_widest_lanes(
@@ -167,6 +169,16 @@ private:
   KdTree(const std::vector<Scalar>& rows, std::span<const PointId> ids, std::size_t dim, M metric)
       : metric_(std::move(metric)), dim_(dim), layout_(dim == 0 ? 0 : rows.size() / dim) {
     if (layout_.points() == 0) return;
+    detail::check_metric(metric_, dimension());
+    if constexpr (detail::HasPeriods<M>) {
+      static_assert(std::floating_point<Scalar>, "coordinates on circles must be floating point numbers");
+      build(detail::wrapped_rows(metric_, dimension(), rows), ids);
+    } else {
+      build(rows, ids);
+    }
+  }
+
+  void build(const std::vector<Scalar>& rows, std::span<const PointId> ids) {
     detail::PointsToSplit<Scalar, Dim> ordered(rows, dimension());
     splits_.resize(layout_.splits());
     detail::split_all(ordered, layout_, splits_);
@@ -195,9 +207,11 @@ private:
     const std::size_t near = 2 * slot + (offset < 0 ? 0 : 1);
     descend(depth + 1, near, bound, query, offsets, collector, work);
     const Real old = offsets[here.axis];
-    const Real far_bound = detail::moved_bound(metric_, bound, old, offset, here.axis);
+    const Real across =
+        detail::offset_across(metric_, query[here.axis], static_cast<Real>(here.value), here.axis);
+    const Real far_bound = detail::moved_bound(metric_, bound, old, across, here.axis);
     if (!(far_bound < static_cast<Real>(collector.limit()))) return;
-    offsets[here.axis] = offset;
+    offsets[here.axis] = across;
     descend(depth + 1, near ^ 1U, far_bound, query, offsets, collector, work);
     offsets[here.axis] = old;
   }

@@ -11,17 +11,21 @@
 /// both grow with their argument, accumulating grows with |difference|, and true distances obey the triangle
 /// inequality.
 ///
-/// A metric whose sum is not a sum but a maximum says so: static constexpr bool additive = false.
+/// A metric whose sum is not a sum but a maximum says so: static constexpr bool additive = false. One whose
+/// axes may be circles has period(axis), infinite for a straight axis; one that can be set up wrongly has
+/// check(dimension), which throws. Both are found in axis_metrics.hpp.
 ///
 /// accumulate() is a template over the number type so that one line serves single numbers and sixteen lanes
 /// alike: write it with +, *, comparisons and ?:.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <limits>
+#include <vector>
 
 #include <cairn/version.hpp>
 
@@ -109,29 +113,58 @@ struct Angular {
   }
 };
 
-/// Euclidean distance with a weight for each axis: sqrt(sum of (weight[a] * difference[a])^2). Weights >= 0,
-/// finite.
-template <std::size_t Dim, std::floating_point Real = float>
-struct WeightedL2 {
-  std::array<Real, Dim> weight;
+namespace detail {
 
-  template <class Number>
-  [[gnu::always_inline]] void accumulate(Number& sum, const Number& difference,
-                                         std::size_t axis) const noexcept {
-    const Number scaled = difference * weight[axis];
-    sum = sum + scaled * scaled;
-  }
-  template <std::floating_point R>
-  [[nodiscard]] static R restore(R reduced) noexcept {
-    return std::sqrt(reduced);
-  }
-  template <std::floating_point R>
-  [[nodiscard]] static R reduce(R distance) noexcept {
-    return distance * distance;
-  }
+/// Whether axes of a metric may be circles.
+template <class M>
+concept HasPeriods = requires(const M& metric, std::size_t axis) {
+  { metric.period(axis) } -> std::convertible_to<double>;
 };
 
-namespace detail {
+/// Throws Error where the metric cannot serve points of `dim` coordinates.
+template <class M>
+void check_metric(const M& metric, std::size_t dim) {
+  if constexpr (requires { metric.check(dim); }) metric.check(dim);
+}
+
+/// The representative in [-period / 2, period / 2) of a coordinate on a circle, exact.
+template <class Real>
+[[nodiscard]] Real wrap(Real coordinate, Real period) noexcept {
+  const Real wrapped = std::remainder(coordinate, period);
+  return 2 * wrapped == period ? -wrapped : wrapped;
+}
+
+/// Does so for the circles among the axes of a point.
+template <class Real, class M>
+void wrap_row(const M& metric, std::size_t dim, Real* row) noexcept {
+  if constexpr (HasPeriods<M>)
+    for (std::size_t a = 0; a < dim; ++a)
+      if (const auto period = static_cast<Real>(metric.period(a));
+          period < std::numeric_limits<Real>::infinity())
+        row[a] = wrap(row[a], period);
+}
+
+template <class Scalar, class M>
+[[nodiscard]] std::vector<Scalar> wrapped_rows(const M& metric, std::size_t dim, std::vector<Scalar> rows) {
+  for (std::size_t i = 0; i < rows.size(); i += dim) wrap_row(metric, dim, rows.data() + i);
+  return rows;
+}
+
+/// How far a query is from the side of a split on which it is not. On a circle that side also reaches the
+/// seam; a few ulps are taken off, since sums there are rounded differently than distances to points.
+template <class M, class Real>
+[[nodiscard]] Real offset_across(const M& metric, Real query, Real value, std::size_t axis) noexcept {
+  const Real direct = query - value;
+  if constexpr (HasPeriods<M>) {
+    const auto half = static_cast<Real>(metric.period(axis)) / 2;
+    const Real slack =
+        half < std::numeric_limits<Real>::infinity() ? 8 * std::numeric_limits<Real>::epsilon() * half : 0;
+    const Real seam = std::max((direct < 0 ? query + half : half - query) - slack, Real{0});
+    return std::min(std::abs(direct), seam);
+  } else {
+    return direct;
+  }
+}
 
 /// Lower bound of the distance to a cell after its nearest side on one axis moved from `old` to `offset`
 /// away from the query (both as differences, |offset| >= |old|).

@@ -34,6 +34,7 @@ public:
   NearestFirst(const Tree& tree, const Query& query) : tree_(&tree), query_(tree.dimension()) {
     if (tree.empty()) return;
     detail::copy_point<Real>(query, query_.size(), query_.data(), {"NearestFirst: query", 0});
+    detail::wrap_row(tree.metric(), query_.size(), query_.data());
     cells_.push_back({0, 0, 0, {}});
   }
 
@@ -87,7 +88,9 @@ private:
       const auto& split = tree_->split(cell.depth, cell.slot);
       const Real offset = query_[split.axis] - static_cast<Real>(split.value);
       const std::size_t near = 2 * cell.slot + (offset < 0 ? 0 : 1);
-      queue_far_side(cell, split.axis, offset, near ^ 1U);
+      const Real across = detail::offset_across(tree_->metric(), query_[split.axis],
+                                                static_cast<Real>(split.value), split.axis);
+      queue_far_side(cell, split.axis, across, near ^ 1U);
       cell.slot = near;
     }
   }

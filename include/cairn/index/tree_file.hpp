@@ -99,10 +99,11 @@ void save_tree(std::ostream& out, const KdTree<Scalar, Dim, M>& tree) {
   if (!out.flush()) raise("save_tree: the tree could not be written");
 }
 
-/// Reads a tree of the same kind. Throws Error, with `name` of the source, for what is no tree file, a newer
-/// version, another kind of coordinates or dimension, a truncated or damaged one.
+/// Reads a tree of the same kind, whose metric is not in the file. Throws Error, with `name` of the source,
+/// for what is no tree file, a newer version, another kind of coordinates or dimension, a truncated or
+/// damaged one.
 template <class Tree, class Scalar = typename Tree::Coordinate>
-[[nodiscard]] Tree load_tree(std::istream& in, const std::string& name) {
+[[nodiscard]] Tree load_tree(std::istream& in, const std::string& name, typename Tree::Measure metric = {}) {
   const detail::TreeFileHeader expected;
   detail::TreeFileHeader header;
   if (!in.read(reinterpret_cast<char*>(&header), sizeof(header)) || header.magic != expected.magic)
@@ -122,7 +123,7 @@ template <class Tree, class Scalar = typename Tree::Coordinate>
   if (detail::fnv1a(detail::bytes_of(rows), detail::fnv1a(detail::bytes_of(ids))) != header.checksum)
     raise(name + ": the checksum is wrong, the tree file is damaged");
   if (ids.empty()) return Tree();
-  return Tree(Rows<Scalar>(rows, header.dimension), std::span<const PointId>(ids));
+  return Tree(Rows<Scalar>(rows, header.dimension), std::span<const PointId>(ids), std::move(metric));
 }
 
 }  // namespace cairn::inline CAIRN_ABI
