@@ -32,8 +32,8 @@ public:
 
   BoxTree() = default;
 
-  BoxTree(const LeafBlocks<Scalar>& blocks, std::size_t dim, const KdLayout& layout)
-      : layout_(layout), dim_(dim) {
+  /// Room for the boxes of a layout, not yet written.
+  BoxTree(std::size_t dim, const KdLayout& layout) : layout_(layout), dim_(dim) {
     levels_ = (layout.depth() + 3) / 4;
     std::size_t nodes = 0;
     for (unsigned level = 0; level < levels_; ++level) {
@@ -41,9 +41,17 @@ public:
       nodes += nodes_at(level);
     }
     boxes_.resize(nodes * node_size());
-    if (levels_ == 0) return;
-    for (std::size_t node = nodes_at(levels_ - 1); node-- > 0;) fill_last(blocks, node);
-    for (unsigned level = levels_ - 1; level-- > 0;)
+  }
+
+  /// Nodes of the last level, whose children are leaves; 0 where one leaf is all.
+  [[nodiscard]] std::size_t last_nodes() const noexcept { return levels_ == 0 ? 0 : nodes_at(levels_ - 1); }
+  /// Writes some nodes of the last level, once all leaves are written.
+  void fill_last(const LeafBlocks<Scalar>& blocks, const Range& nodes) {
+    for (std::size_t node = nodes.begin; node < nodes.end; ++node) fill_last(blocks, node);
+  }
+  /// Writes the nodes above, once all of the last level are written.
+  void fill_above() {
+    for (unsigned level = levels_ == 0 ? 0 : levels_ - 1; level-- > 0;)
       for (std::size_t node = 0; node < nodes_at(level); ++node) fill_inner(level, node);
   }
 

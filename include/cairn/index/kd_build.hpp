@@ -15,10 +15,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <span>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
+#include <cairn/core/parallel.hpp>
 #include <cairn/index/kd_layout.hpp>
+#include <cairn/index/neighbors.hpp>
 #include <cairn/index/select_rank.hpp>
 
 namespace cairn::inline CAIRN_ABI::detail {
@@ -65,15 +69,32 @@ template <class Record>
 template <class Scalar, std::size_t Dim>
 class WholePoints {
 public:
-  WholePoints(const std::vector<Scalar>& rows, std::size_t) : records_(rows.size() / Dim) {
-    for (std::size_t i = 0; i < records_.size(); ++i) {
-      std::memcpy(records_[i].point.data(), &rows[i * Dim], sizeof(records_[i].point));
-      records_[i].number = static_cast<std::uint32_t>(i);
-    }
+  struct Scratch {
+    explicit Scratch(std::size_t) {}
+  };
+
+  explicit WholePoints(std::size_t) {}
+
+  void reserve(std::size_t count) { records_.reserve(count); }
+  void add(PointId id, const Scalar* row) {
+    Record& record = records_.emplace_back();
+    std::memcpy(record.point.data(), row, sizeof(record.point));
+    record.id = id;
   }
+  /// Takes all points at once; ids 0, 1, ... where none are given.
+  void take(const std::vector<Scalar>& rows, std::span<const PointId> ids, unsigned threads) {
+    records_.resize(rows.size() / Dim);
+    parallel_for(records_.size(), threads, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        std::memcpy(records_[i].point.data(), &rows[i * Dim], sizeof(records_[i].point));
+        records_[i].id = ids.empty() ? static_cast<PointId>(i) : ids[i];
+      }
+    });
+  }
+  [[nodiscard]] std::size_t size() const noexcept { return records_.size(); }
 
   /// Puts the lower points of [begin, end) before `middle` and the upper ones behind.
-  Split<Scalar> split(std::size_t begin, std::size_t middle, std::size_t end) {
+  Split<Scalar> split(std::size_t begin, std::size_t middle, std::size_t end, Scratch&) {
     Record* const first = records_.data();
     const std::size_t axis = farthest_axis(first + begin, first + end);
     select_rank(first + begin, first + middle, first + end,
@@ -81,13 +102,13 @@ public:
     return {first[middle].point[axis], static_cast<std::uint32_t>(axis)};
   }
 
-  [[nodiscard]] std::uint32_t number(std::size_t rank) const noexcept { return records_[rank].number; }
+  [[nodiscard]] PointId id(std::size_t rank) const noexcept { return records_[rank].id; }
   [[nodiscard]] const Scalar* point(std::size_t rank) const noexcept { return records_[rank].point.data(); }
 
 private:
   struct Record {
     std::array<Scalar, Dim> point;
-    std::uint32_t number;
+    PointId id;
   };
   std::vector<Record> records_;
 };
@@ -97,47 +118,70 @@ private:
 template <class Scalar>
 class NumberedPoints {
 public:
-  NumberedPoints(const std::vector<Scalar>& rows, std::size_t dim)
-      : rows_(rows), dim_(dim), records_(rows.size() / dim), sums_(dim), squares_(dim) {
+  using Real = RealOf<Scalar>;
+  struct Scratch {
+    explicit Scratch(std::size_t dim) : sums(dim), squares(dim) {}
+    std::vector<Real> sums;
+    std::vector<Real> squares;
+  };
+
+  explicit NumberedPoints(std::size_t dim) : dim_(dim) {}
+
+  void reserve(std::size_t count) {
+    rows_.reserve(count * dim_);
+    ids_.reserve(count);
+    records_.reserve(count);
+  }
+  void add(PointId id, const Scalar* row) {
+    records_.push_back({Scalar{}, static_cast<std::uint32_t>(records_.size())});
+    rows_.insert(rows_.end(), row, row + dim_);
+    ids_.push_back(id);
+  }
+  void take(std::vector<Scalar> rows, std::span<const PointId> ids, unsigned) {
+    rows_ = std::move(rows);
+    ids_.assign(ids.begin(), ids.end());
+    records_.resize(rows_.size() / dim_);
     for (std::size_t i = 0; i < records_.size(); ++i) records_[i].number = static_cast<std::uint32_t>(i);
   }
+  [[nodiscard]] std::size_t size() const noexcept { return records_.size(); }
 
-  Split<Scalar> split(std::size_t begin, std::size_t middle, std::size_t end) {
+  Split<Scalar> split(std::size_t begin, std::size_t middle, std::size_t end, Scratch& scratch) {
     Record* const first = records_.data();
-    const std::size_t axis = varying_axis(begin, end);
+    const std::size_t axis = varying_axis(begin, end, scratch);
     for (std::size_t i = begin; i < end; ++i) first[i].key = point(i)[axis];
     select_rank(first + begin, first + middle, first + end, [](const Record& r) { return r.key; });
     return {first[middle].key, static_cast<std::uint32_t>(axis)};
   }
 
-  [[nodiscard]] std::uint32_t number(std::size_t rank) const noexcept { return records_[rank].number; }
+  [[nodiscard]] PointId id(std::size_t rank) const noexcept {
+    return ids_.empty() ? records_[rank].number : ids_[records_[rank].number];
+  }
   [[nodiscard]] const Scalar* point(std::size_t rank) const noexcept {
     return rows_.data() + std::size_t{records_[rank].number} * dim_;
   }
 
 private:
-  using Real = RealOf<Scalar>;
   struct Record {
     Scalar key;
     std::uint32_t number;
   };
 
-  std::size_t varying_axis(std::size_t begin, std::size_t end) {
+  [[nodiscard]] std::size_t varying_axis(std::size_t begin, std::size_t end, Scratch& scratch) const {
     constexpr std::size_t sample = 256;
     const std::size_t step = (end - begin + sample - 1) / sample;
     const auto count = static_cast<Real>((end - begin + step - 1) / step);
-    sums_.assign(dim_, 0);
-    squares_.assign(dim_, 0);
+    scratch.sums.assign(dim_, 0);
+    scratch.squares.assign(dim_, 0);
     for (std::size_t i = begin; i < end; i += step)
       for (std::size_t a = 0; a < dim_; ++a) {
         const Real from_first = static_cast<Real>(point(i)[a]) - static_cast<Real>(point(begin)[a]);
-        sums_[a] += from_first;
-        squares_[a] += from_first * from_first;
+        scratch.sums[a] += from_first;
+        scratch.squares[a] += from_first * from_first;
       }
     std::size_t widest = 0;
     Real largest = 0;
     for (std::size_t a = 0; a < dim_; ++a) {
-      const Real variance = squares_[a] - sums_[a] * sums_[a] / count;
+      const Real variance = scratch.squares[a] - scratch.sums[a] * scratch.sums[a] / count;
       if (variance > largest) {
         largest = variance;
         widest = a;
@@ -146,11 +190,10 @@ private:
     return widest;
   }
 
-  const std::vector<Scalar>& rows_;
   std::size_t dim_;
+  std::vector<Scalar> rows_;
+  std::vector<PointId> ids_;
   std::vector<Record> records_;
-  std::vector<Real> sums_;
-  std::vector<Real> squares_;
 };
 
 /// Most coordinates of a point that is moved whole and whose tree holds boxes.
@@ -159,18 +202,5 @@ inline constexpr std::size_t few_axes = 8;
 template <class Scalar, std::size_t Dim>
 using PointsToSplit = std::conditional_t<Dim != 0 && Dim <= few_axes, WholePoints<Scalar, Dim == 0 ? 1 : Dim>,
                                          NumberedPoints<Scalar>>;
-
-/// Splits all points down to leaves; splits[] as KdLayout::split_at says.
-template <class Points, class Scalar>
-void split_all(Points& points, const KdLayout& layout, std::vector<Split<Scalar>>& splits, unsigned depth = 0,
-               std::size_t slot = 0) {
-  const Range leaves = layout.leaves_below(depth, slot);
-  if (leaves.size() <= 1) return;
-  const std::size_t middle = layout.leaves_below(depth + 1, 2 * slot).end;
-  splits[KdLayout::split_at(depth, slot)] = points.split(
-      layout.first_point(leaves.begin), layout.first_point(middle), layout.first_point(leaves.end));
-  split_all(points, layout, splits, depth + 1, 2 * slot);
-  split_all(points, layout, splits, depth + 1, 2 * slot + 1);
-}
 
 }  // namespace cairn::inline CAIRN_ABI::detail

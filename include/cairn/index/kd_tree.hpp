@@ -30,7 +30,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/index/box_tree.hpp>
-#include <cairn/index/kd_build.hpp>
+#include <cairn/index/kd_builder.hpp>
 #include <cairn/index/kd_layout.hpp>
 #include <cairn/index/leaf_blocks.hpp>
 #include <cairn/index/metric.hpp>
@@ -38,6 +38,11 @@
 #include <cairn/index/points.hpp>
 
 namespace cairn::inline CAIRN_ABI {
+
+/// How a tree is built. The tree is the same for any number of threads (0 counts as 1).
+struct BuildOptions {
+  unsigned threads = 1;
+};
 
 /// Scalar: float, double or std::uint8_t coordinates. Dim: number of coordinates, or dynamic_dim. Distances
 /// are float, for double coordinates double.
@@ -57,35 +62,46 @@ public:
   /// Builds from a set of points, ids 0 ... n - 1. Throws Error, naming the point, for a coordinate that is
   /// not finite (or so large that squares overflow) and for points of different dimensions. O(n log n).
   template <PointSet Points>
-  explicit KdTree(const Points& points, M metric = {})
+  explicit KdTree(const Points& points, M metric = {}, BuildOptions options = {})
       : KdTree(detail::copy_points<Scalar>(points, detail::dimension_of<Dim>(points), "KdTree: point"), {},
-               detail::dimension_of<Dim>(points), std::move(metric)) {}
+               detail::dimension_of<Dim>(points), std::move(metric), options.threads) {}
 
   /// The same with the caller's ids, one a point, none of them no_point.
   template <PointSet Points>
-  KdTree(const Points& points, std::span<const PointId> ids, M metric = {})
+  KdTree(const Points& points, std::span<const PointId> ids, M metric = {}, BuildOptions options = {})
       : KdTree(detail::copy_points<Scalar>(points, detail::dimension_of<Dim>(points), "KdTree: point"), ids,
-               detail::dimension_of<Dim>(points), std::move(metric)) {
+               detail::dimension_of<Dim>(points), std::move(metric), options.threads) {
     CAIRN_EXPECTS(ids.size() == size(), "KdTree: there must be one id a point");
   }
 
   /// The same from rows of `dim` numbers that are known to be finite; ids as above, or empty for 0 ... n - 1.
-  [[nodiscard]] static KdTree from_rows(const std::vector<Scalar>& rows, std::size_t dim,
-                                        std::span<const PointId> ids = {}, M metric = {}) {
+  [[nodiscard]] static KdTree from_rows(std::vector<Scalar> rows, std::size_t dim,
+                                        std::span<const PointId> ids = {}, M metric = {},
+                                        BuildOptions options = {}) {
     CAIRN_EXPECTS(Dim == dynamic_dim || dim == Dim, "KdTree::from_rows: the dimension is fixed by the type");
     CAIRN_EXPECTS(ids.empty() || ids.size() * dim == rows.size(), "KdTree: there must be one id a point");
-    return KdTree(rows, ids, dim, std::move(metric));
+    return KdTree(std::move(rows), ids, dim, std::move(metric), options.threads);
   }
 
-  [[nodiscard]] std::size_t size() const noexcept { return layout_.points(); }
+  /// For indices made of trees: a tree of what a builder made.
+  [[nodiscard]] static KdTree from_parts(detail::KdParts<Scalar> parts, std::size_t dim, M metric) {
+    KdTree tree;
+    tree.metric_ = std::move(metric);
+    tree.dim_ = dim;
+    tree.parts_ = std::move(parts);
+    return tree;
+  }
+
+  [[nodiscard]] std::size_t size() const noexcept { return parts_.layout.points(); }
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
   [[nodiscard]] std::size_t dimension() const noexcept { return Dim != dynamic_dim ? Dim : dim_; }
-  [[nodiscard]] std::size_t leaves() const noexcept { return layout_.leaves(); }
-  [[nodiscard]] unsigned depth() const noexcept { return layout_.depth(); }
+  [[nodiscard]] std::size_t leaves() const noexcept { return parts_.layout.leaves(); }
+  [[nodiscard]] unsigned depth() const noexcept { return parts_.layout.depth(); }
   [[nodiscard]] const M& metric() const noexcept { return metric_; }
   /// Memory held, the points included.
   [[nodiscard]] std::size_t bytes() const noexcept {
-    return blocks_.bytes() + boxes_.bytes() + splits_.capacity() * sizeof(detail::Split<Scalar>);
+    return parts_.blocks.bytes() + parts_.boxes.bytes() +
+           parts_.splits.capacity() * sizeof(detail::Split<Scalar>);
   }
 
   /// The nearest point; nothing where the tree is empty.
@@ -137,8 +153,9 @@ public:
     detail::wrap_row(metric_, dimension(), row.data());
     Work done;
     if (use_boxes())
-      detail::with_widest_lanes(
-          [&]() CAIRN_INLINED { boxes_.search(blocks_, row.data(), dimension(), metric_, collector, done); });
+      detail::with_widest_lanes([&]() CAIRN_INLINED {
+        parts_.boxes.search(parts_.blocks, row.data(), dimension(), metric_, collector, done);
+      });
     else
       search_splits(row.data(), collector, done);
     if (work != nullptr) *work += done;
@@ -147,43 +164,36 @@ public:
   /// Calls visit(id, std::span<const Scalar>) for every point, in leaf order.
   template <class Visit>
   void for_each(Visit&& visit) const {
-    blocks_.for_each(visit);
+    parts_.blocks.for_each({0, leaves()}, visit);
   }
 
   /// For searches of other headers: the shape, the splits, and one leaf's points offered to a collector.
-  [[nodiscard]] const detail::KdLayout& layout() const noexcept { return layout_; }
+  [[nodiscard]] const detail::KdLayout& layout() const noexcept { return parts_.layout; }
   [[nodiscard]] const detail::Split<Scalar>& split(unsigned depth, std::size_t slot) const noexcept {
-    return splits_[detail::KdLayout::split_at(depth, slot)];
+    return parts_.splits[detail::KdLayout::split_at(depth, slot)];
   }
-  [[nodiscard]] const detail::LeafBlocks<Scalar>& blocks() const noexcept { return blocks_; }
-  void prefetch_leaf(std::size_t leaf) const noexcept { blocks_.prefetch(leaf); }
+  [[nodiscard]] const detail::LeafBlocks<Scalar>& blocks() const noexcept { return parts_.blocks; }
+  void prefetch_leaf(std::size_t leaf) const noexcept { parts_.blocks.prefetch(leaf); }
   template <Collector<Real> C>
   void scan_leaf(std::size_t leaf, const Real* query, C& collector, Work& work) const {
     ++work.leaves;
     work.distances += detail::block_size;
     detail::with_widest_lanes(
-        [&]() CAIRN_INLINED { blocks_.scan(leaf, query, dimension(), metric_, collector); });
+        [&]() CAIRN_INLINED { parts_.blocks.scan(leaf, query, dimension(), metric_, collector); });
   }
 
 private:
-  KdTree(const std::vector<Scalar>& rows, std::span<const PointId> ids, std::size_t dim, M metric)
-      : metric_(std::move(metric)), dim_(dim), layout_(dim == 0 ? 0 : rows.size() / dim) {
-    if (layout_.points() == 0) return;
+  KdTree(std::vector<Scalar> rows, std::span<const PointId> ids, std::size_t dim, M metric, unsigned threads)
+      : metric_(std::move(metric)), dim_(dim) {
+    if (rows.empty()) return;
     detail::check_metric(metric_, dimension());
     if constexpr (detail::HasPeriods<M>) {
       static_assert(std::floating_point<Scalar>, "coordinates on circles must be floating point numbers");
-      build(detail::wrapped_rows(metric_, dimension(), rows), ids);
-    } else {
-      build(rows, ids);
+      rows = detail::wrapped_rows(metric_, dimension(), rows);
     }
-  }
-
-  void build(const std::vector<Scalar>& rows, std::span<const PointId> ids) {
-    detail::PointsToSplit<Scalar, Dim> ordered(rows, dimension());
-    splits_.resize(layout_.splits());
-    detail::split_all(ordered, layout_, splits_);
-    blocks_ = detail::LeafBlocks<Scalar>(ordered, dimension(), layout_, ids.data());
-    if (use_boxes()) boxes_ = detail::BoxTree<Scalar>(blocks_, dimension(), layout_);
+    detail::KdBuilder<Scalar, Dim> builder(dimension());
+    builder.take(std::move(rows), ids, threads);
+    parts_ = builder.finish(threads);
   }
 
   [[nodiscard]] bool use_boxes() const noexcept { return dimension() <= detail::few_axes; }
@@ -199,7 +209,7 @@ private:
   template <class C>
   void descend(unsigned depth, std::size_t slot, Real bound, const Real* query, Real* offsets, C& collector,
                Work& work) const {
-    const detail::Range leaves = layout_.leaves_below(depth, slot);
+    const detail::Range leaves = parts_.layout.leaves_below(depth, slot);
     if (leaves.size() == 1) return scan_leaf(leaves.begin, query, collector, work);
     ++work.nodes;
     const detail::Split<Scalar>& here = split(depth, slot);
@@ -218,10 +228,7 @@ private:
 
   [[no_unique_address]] M metric_{};
   std::size_t dim_ = 0;
-  detail::KdLayout layout_;
-  detail::LeafBlocks<Scalar> blocks_;
-  std::vector<detail::Split<Scalar>> splits_;
-  detail::BoxTree<Scalar> boxes_;
+  detail::KdParts<Scalar> parts_;
 };
 
 }  // namespace cairn::inline CAIRN_ABI

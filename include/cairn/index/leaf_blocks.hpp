@@ -41,21 +41,22 @@ public:
 
   LeafBlocks() = default;
 
-  /// Takes the ordered points: points.point(rank) and points.number(rank). Their ids are ids[number], or the
-  /// number itself without ids.
+  /// Room for the leaves of a layout, not yet written.
+  LeafBlocks(std::size_t dim, const KdLayout& layout)
+      : dim_(dim), coordinates_(layout.leaves() * block_size * dim), ids_(layout.leaves() * block_size) {}
+
+  /// Writes some leaves from the ordered points: points.point(rank) and points.id(rank).
   template <class Points>
-  LeafBlocks(const Points& points, std::size_t dim, const KdLayout& layout, const PointId* ids)
-      : dim_(dim), coordinates_(layout.leaves() * block_size * dim), ids_(layout.leaves() * block_size) {
-    for (std::size_t leaf = 0; leaf < layout.leaves(); ++leaf) {
+  void fill(const Points& points, const KdLayout& layout, const Range& leaves) {
+    for (std::size_t leaf = leaves.begin; leaf < leaves.end; ++leaf) {
       const std::size_t first = layout.first_point(leaf);
       const std::size_t count = layout.first_point(leaf + 1) - first;
-      Scalar* block = coordinates_.data() + leaf * block_size * dim;
+      Scalar* block = coordinates_.data() + leaf * block_size * dim_;
       for (std::size_t lane = 0; lane < block_size; ++lane) {
         const std::size_t rank = first + (lane < count ? lane : count - 1);
         const Scalar* point = points.point(rank);
-        for (std::size_t a = 0; a < dim; ++a) block[a * block_size + lane] = point[a];
-        const std::uint32_t number = points.number(rank);
-        ids_[leaf * block_size + lane] = lane >= count ? no_point : ids != nullptr ? ids[number] : number;
+        for (std::size_t a = 0; a < dim_; ++a) block[a * block_size + lane] = point[a];
+        ids_[leaf * block_size + lane] = lane < count ? points.id(rank) : no_point;
       }
     }
   }
@@ -103,11 +104,12 @@ public:
     }
   }
 
-  /// Calls visit(id, row) for every point; row is a span of dim numbers, valid during the call.
+  /// Calls visit(id, row) for every point of some leaves; row is a span of dim numbers, valid during the
+  /// call.
   template <class Visit>
-  void for_each(Visit&& visit) const {
+  void for_each(const Range& leaves, Visit&& visit) const {
     std::vector<Scalar> row(dim_);
-    for (std::size_t leaf = 0; leaf < leaves(); ++leaf)
+    for (std::size_t leaf = leaves.begin; leaf < leaves.end; ++leaf)
       for (std::size_t lane = 0; lane < block_size; ++lane) {
         if (ids(leaf)[lane] == no_point) continue;
         for (std::size_t a = 0; a < dim_; ++a) row[a] = block(leaf)[a * block_size + lane];
