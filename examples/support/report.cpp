@@ -153,6 +153,7 @@ void Report::add(const LinePlot& panel) {
   json["x"] = axis(panel.x);
   json["y"] = axis(panel.y);
   json["logarithmic"] = panel.logarithmic;
+  json["logarithmic_x"] = panel.logarithmic_x;
   json["x_values"] = rounded_all(panel.x_values);
   json["curves"] = Json::array();
   for (std::size_t i = 0; i < panel.x_values.size(); ++i)

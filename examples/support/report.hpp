@@ -59,6 +59,7 @@ struct LinePlot {
   std::vector<double> x_values = {};  ///< never falling
   std::vector<Curve> curves = {};     ///< none: the panel shows its caption only
   bool logarithmic = false;           ///< the y axis; values that are not positive leave gaps
+  bool logarithmic_x = false;         ///< the x axis too; all x values must be positive
   bool wide = false;                  ///< over the whole width of the page
 };
 

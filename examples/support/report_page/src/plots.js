@@ -29,6 +29,18 @@ function horizontal(axis) {
   return { ...axisOptions(axis), size: 34, space: 60 };
 }
 
+/** 1, 2 and 5 times the powers of ten from low to high. */
+function logarithmicTicks(_, __, low, high) {
+  const ticks = [];
+  for (let power = Math.floor(Math.log10(low)); 10 ** power <= high; ++power)
+    ticks.push(...[1, 2, 5].map((factor) => factor * 10 ** power).filter((tick) => tick >= low && tick <= high));
+  return ticks;
+}
+
+function logarithmic(axis) {
+  return { ...horizontal(axis), splits: logarithmicTicks, filter: (_, ticks) => ticks };
+}
+
 /** Positive values only, for a logarithmic axis. */
 function positive(values) {
   return values.map((value) => (value > 0 ? value : null));
@@ -47,8 +59,11 @@ export function lines(panel, body) {
   const options = {
     width: 600,
     height: panel.wide ? 280 : 260,
-    scales: { x: { time: false }, y: panel.logarithmic ? { distr: 3 } : { range: linearRange } },
-    axes: [horizontal(panel.x), axisOptions(panel.y)],
+    scales: {
+      x: panel.logarithmic_x ? { time: false, distr: 3, range: (_, low, high) => [low, high] } : { time: false },
+      y: panel.logarithmic ? { distr: 3 } : { range: linearRange },
+    },
+    axes: [panel.logarithmic_x ? logarithmic(panel.x) : horizontal(panel.x), axisOptions(panel.y)],
     cursor: { sync: { key: pairing.key, setSeries: false }, focus: { prox: 30 }, points: { size: 6 } },
     series: [
       { label: labelled(panel.x), value: (_, value) => readable(value) },

@@ -1,0 +1,169 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+// The study of the thesis's chapter 4: a set that grows, in one tree that is rebuilt, in multi-kd-trees of
+// several shapes, and in no tree at all.
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iostream>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "study/analysis.hpp"
+#include "study/report.hpp"
+#include "study/streams.hpp"
+#include "support/progress.hpp"
+#include "support/scoreboard.hpp"
+
+namespace {
+
+using cairn_study::Drive;
+using cairn_study::Stream;
+using cairn_study::Study;
+
+struct Options {
+  bool full = false;
+  std::string only;  ///< name of one stream
+  std::filesystem::path out = "build/benchmark";
+};
+
+constexpr const char* usage =
+    "usage: index_study [--quick | --full] [--only points_3|clusters_64|sift_128|surf_64] [--out FOLDER]\n"
+    "  --quick   up to 2e5 points and 5e4 descriptors, about three minutes (the default)\n"
+    "  --full    up to 1e7 points and 1e6 descriptors, about an hour and 4 GB\n";
+
+std::optional<Options> parse(int argc, char** argv) {
+  Options options;
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    if (word == "--full" || word == "--quick")
+      options.full = word == "--full";
+    else if (word == "--only" && i + 1 < argc)
+      options.only = argv[++i];
+    else if (word == "--out" && i + 1 < argc)
+      options.out = argv[++i];
+    else
+      return std::nullopt;
+  }
+  return options;
+}
+
+struct Contender {
+  std::string name;
+  std::size_t growth;
+  std::size_t first_steps;
+};
+
+std::vector<Contender> contenders() {
+  std::vector<Contender> list{{"single tree", 0, 0}};
+  for (const std::size_t growth : {2U, 3U, 4U, 8U})
+    for (const std::size_t first_steps : {1U, 10U, 50U})
+      list.push_back(
+          {"q = " + std::to_string(growth) + ", z = " + std::to_string(first_steps), growth, first_steps});
+  list.push_back({"scan", 0, 0});
+  return list;
+}
+
+Study study(Stream stream) {
+  const cairn_study::Truth truth = make_truth(stream);
+  const cairn_study::StoreOptions options{stream.dim, stream.leaves};
+  const auto list = contenders();
+  example::Progress progress(std::cerr, stream.name, list.size() * stream.steps());
+  std::vector<Drive> drives;
+  for (const Contender& contender : list) {
+    const bool is_scan = contender.name == "scan";
+    const bool is_single = contender.name == "single tree";
+    const auto store =
+        is_scan     ? cairn_study::make_scan(options)
+        : is_single ? cairn_study::make_single_tree(options)
+                    : cairn_study::make_forest(options, {.first_size = contender.first_steps * stream.step,
+                                                         .growth = contender.growth});
+    // At most about a hundred steps of those whose step grows with n.
+    const std::size_t stride = is_scan || is_single ? std::max<std::size_t>(1, stream.steps() / 80) : 1;
+    Drive drive = run(stream, truth, *store, stride, is_scan || stream.dim == 3,
+                      [&] { progress.step(contender.name); });
+    drive.name = contender.name;
+    drive.growth = contender.growth;
+    drive.first_steps = contender.first_steps;
+    drives.push_back(std::move(drive));
+  }
+  return analyse(std::move(stream), std::move(drives));
+}
+
+std::vector<Study> run_all(const Options& options) {
+  using Make = std::function<std::optional<Stream>()>;
+  const bool full = options.full;
+  const std::size_t steps = full ? 1000 : 250;
+  const std::vector<std::pair<std::string, Make>> streams{
+      {"points_3", [&] { return cairn_study::uniform_points(full ? 10000000 : 300000, steps); }},
+      {"clusters_64", [&] { return cairn_study::clustered(full ? 1000000 : 50000, steps); }},
+      {"sift_128", [&] { return cairn_study::sift_descriptors(full ? 99000 : 40000, steps); }},
+      {"surf_64", [&] { return cairn_study::arena_descriptors(full ? 0 : 40, steps); }}};
+  std::vector<Study> studies;
+  for (const auto& [name, make] : streams) {
+    if (!options.only.empty() && options.only != name) continue;
+    std::cerr << name << ": making the data\n";
+    std::optional<Stream> stream = make();
+    if (stream)
+      studies.push_back(study(std::move(*stream)));
+    else
+      std::cerr << name << ": skipped, there is no such data here\n";
+  }
+  return studies;
+}
+
+void write(const std::filesystem::path& path, const std::string& text) {
+  std::ofstream file(path, std::ios::binary);
+  if (!(file << text) || !file.flush()) throw std::runtime_error("cannot write " + path.string());
+  std::cout << "  " << path.string() << '\n';
+}
+
+/// Writes everything; returns how many answers were wrong.
+std::size_t finish(const std::vector<Study>& studies, const Options& options) {
+  std::filesystem::create_directories(options.out);
+  std::cout << "The results are in " << options.out.string() << ":\n";
+  write(options.out / "index_study.json", to_json(studies));
+  write(options.out / "index_study.csv", to_csv(studies));
+  const cairn_bench::Context here = cairn_bench::context();
+  const std::string subtitle =
+      here.cpu + ", one thread; " + here.compiler + "; " + here.flags + (options.full ? "; full" : "; quick");
+  if (const auto page = make_report(studies, subtitle).html())
+    write(options.out / "index_study.html", *page);
+  else
+    std::cout << "  " << example::why_no_report() << '\n';
+  std::size_t wrong = 0;
+  for (const Study& study : studies)
+    for (const auto& result : study.results) wrong += result.drive.wrong;
+  return wrong;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) try {
+  const std::optional<Options> options = parse(argc, argv);
+  if (!options) {
+    std::cerr << usage;
+    return 2;
+  }
+  const std::vector<Study> studies = run_all(*options);
+  if (studies.empty()) {
+    std::cerr << "index_study: nothing was run\n" << usage;
+    return 2;
+  }
+  if (const std::size_t wrong = finish(studies, *options); wrong > 0) {
+    std::cerr << "index_study: " << wrong << " answers were wrong\n";
+    return 1;
+  }
+  return 0;
+} catch (const std::exception& error) {
+  std::cerr << "index_study: " << error.what() << '\n';
+  return 1;
+}
