@@ -109,6 +109,21 @@ TEST_SUITE("robust_alignment") {
     CHECK(a.inliers[0] == 0);
   }
 
+  TEST_CASE("align_robustly: coordinates a million metres from the origin cost no accuracy") {
+    cairn::Random random(cairn_test::seed());
+    const Vector<3> far(1e6, -2e6, 5e5);
+    const SE3 T = cairn_test::random_pose(random);
+    auto data = pairs(T, 30, random);
+    const RobustAlignment near = align_robustly(data);
+    for (PointMatch& pair : data) pair.target += far;
+    const RobustAlignment moved = align_robustly(data);
+    REQUIRE(near.good());
+    REQUIRE(moved.good());
+    CHECK((moved.T_target_source.translation() - near.T_target_source.translation() - far).norm() < 1e-6);
+    CHECK(cairn::local(moved.T_target_source.rotation(), near.T_target_source.rotation()).norm() < 1e-7);
+    CHECK(moved.inliers == near.inliers);
+  }
+
   TEST_CASE("align_robustly: names the pair that is not finite") {
     cairn::Random random(cairn_test::seed());
     auto data = pairs(SE3(), 0, random);

@@ -373,6 +373,12 @@ TEST_SUITE("stereo_pose") {
     CHECK(message([](StereoMatch& m) { m.covariance(0, 1) = NAN; }).find("match 13") != std::string::npos);
     CHECK(message([](StereoMatch& m) { m.covariance(0, 0) = -1; }).find("match 13") != std::string::npos);
     CHECK(message([](StereoMatch& m) { m.sigma_left = 0; }).find("match 13") != std::string::npos);
+    const SE3 nowhere(cairn::SO3(), Vector<3>(0, NAN, 0));
+    cairn::PosePrior vague;
+    vague.information(2, 3) = INFINITY;
+    CHECK_THROWS_AS((void)estimate_stereo_pose(rig, good, {}, cairn::PosePrior{nowhere}), cairn::Error);
+    CHECK_THROWS_AS((void)estimate_stereo_pose(rig, good, {}, vague), cairn::Error);
+    CHECK_THROWS_AS((void)cairn::refine_stereo_pose(rig, good, nowhere), cairn::Error);
   }
 
   TEST_CASE("estimate_stereo_pose: finite numbers of any size never give anything but finite numbers") {

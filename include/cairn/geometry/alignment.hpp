@@ -128,26 +128,71 @@ struct AlignmentMoments {
   double target_squares = 0;             // sum w |y|^2
 };
 
+using DoublePair __attribute__((vector_size(16))) = double;
+
+[[nodiscard]] inline double sum(const DoublePair& pair) noexcept {
+  return pair[0] + pair[1];
+}
+
+/// The sums behind AlignmentMoments, of two pairs of points at a time: accumulators in vectors stay in
+/// registers, those in matrices would wait for memory.
+class MomentSums {
+public:
+  MomentSums(const Vector<3>& source_mean, const Vector<3>& target_mean) noexcept {
+    for (int k = 0; k < 3; ++k) {
+      x0_[k] = source_mean(k) + DoublePair{};
+      y0_[k] = target_mean(k) + DoublePair{};
+    }
+  }
+
+  [[gnu::always_inline]] void add(const Vector<3>* x_of, const Vector<3>* y_of, std::size_t i, std::size_t j,
+                                  DoublePair weight) noexcept {
+    DoublePair x[3], y[3];
+    for (int k = 0; k < 3; ++k) {
+      x[k] = DoublePair{x_of[i](k), x_of[j](k)} - x0_[k];
+      y[k] = DoublePair{y_of[i](k), y_of[j](k)} - y0_[k];
+    }
+    squares_ += weight * (y[0] * y[0] + y[1] * y[1] + y[2] * y[2]);
+    for (int row = 0, k = 0; row < 3; ++row) {
+      const DoublePair weighted = weight * x[row];
+      for (int column = 0; column < 3; ++column) cross_[3 * row + column] += weighted * y[column];
+      for (int column = row; column < 3; ++column, ++k) source_[k] += weighted * x[column];
+    }
+  }
+
+  void get(AlignmentMoments& m) const noexcept {
+    for (int row = 0, k = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) m.cross(row, column) = sum(cross_[3 * row + column]);
+      for (int column = row; column < 3; ++column, ++k)
+        m.source(row, column) = m.source(column, row) = sum(source_[k]);
+    }
+    m.target_squares = sum(squares_);
+  }
+
+private:
+  DoublePair x0_[3], y0_[3], cross_[9] = {}, source_[6] = {}, squares_ = {};
+};
+
 [[nodiscard]] inline AlignmentMoments alignment_moments(std::span<const Vector<3>> source,
                                                         std::span<const Vector<3>> target,
                                                         std::span<const double> weights) {
   AlignmentMoments m;
+  const std::size_t n = source.size();
   const auto weight = [&](std::size_t i) { return weights.empty() ? 1.0 : weights[i]; };
-  for (std::size_t i = 0; i < source.size(); ++i) {
+  Vector<3> x = Vector<3>::Zero(), y = Vector<3>::Zero();
+  for (std::size_t i = 0; i < n; ++i) {
     m.weight += weight(i);
-    m.source_mean += weight(i) * source[i];
-    m.target_mean += weight(i) * target[i];
+    x += weight(i) * source[i];
+    y += weight(i) * target[i];
   }
   if (!(m.weight > 0)) return m;
-  m.source_mean /= m.weight;
-  m.target_mean /= m.weight;
-  for (std::size_t i = 0; i < source.size(); ++i) {
-    const Vector<3> x = source[i] - m.source_mean, y = target[i] - m.target_mean;
-    const Vector<3> wx = weight(i) * x;
-    m.cross += wx * y.transpose();
-    m.source += wx * x.transpose();
-    m.target_squares += weight(i) * y.squaredNorm();
-  }
+  m.source_mean = x / m.weight;
+  m.target_mean = y / m.weight;
+  MomentSums sums(m.source_mean, m.target_mean);
+  for (std::size_t i = 0; i + 1 < n; i += 2)
+    sums.add(source.data(), target.data(), i, i + 1, DoublePair{weight(i), weight(i + 1)});
+  if (n % 2 == 1) sums.add(source.data(), target.data(), n - 1, n - 1, DoublePair{weight(n - 1), 0});
+  sums.get(m);
   return m;
 }
 
