@@ -2,6 +2,10 @@
 // SPDX-License-Identifier: MIT
 #include "landmark_store.hpp"
 
+#include <cstddef>
+#include <string>
+
+#include <cairn/core/check.hpp>
 #include <cairn/index/landmark_map.hpp>
 
 namespace stereo_slam {
@@ -28,7 +32,7 @@ public:
   std::vector<std::optional<StoreMatch>> match(std::span<const Look> looks, unsigned threads) const override {
     std::vector<float> descriptors;
     std::vector<unsigned> labels;
-    descriptors.reserve(looks.size() * descriptor_size);
+    descriptors.reserve(looks.size() * Store::dimension);
     for (const Look& look : looks) {
       descriptors.insert(descriptors.end(), look.descriptor.begin(), look.descriptor.end());
       labels.push_back(label_of(look.sign));
@@ -46,12 +50,29 @@ private:
   Store store_;
 };
 
+template <std::size_t Dimension>
+std::unique_ptr<LandmarkStore> make_store(const StoreOptions& options) {
+  if (options.kind == StoreKind::single)
+    return std::make_unique<StoreOf<cairn::SingleTreeStore<Dimension>>>(options);
+  return std::make_unique<StoreOf<cairn::MultiTreeStore<Dimension>>>(options);
+}
+
 }  // namespace
 
 std::unique_ptr<LandmarkStore> make_landmark_store(const StoreOptions& options) {
-  if (options.kind == StoreKind::single)
-    return std::make_unique<StoreOf<cairn::SingleTreeStore<descriptor_size>>>(options);
-  return std::make_unique<StoreOf<cairn::MultiTreeStore<descriptor_size>>>(options);
+  switch (options.dimension) {
+    case 64:
+      return make_store<64>(options);
+#ifdef EXAMPLES_HAVE_OPENCV
+    case 128:
+      return make_store<128>(options);
+    case 256:
+      return make_store<256>(options);
+#endif
+    default:
+      cairn::raise("landmark store: none was built for descriptors of " + std::to_string(options.dimension) +
+                   " numbers");
+  }
 }
 
 }  // namespace stereo_slam

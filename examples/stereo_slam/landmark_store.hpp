@@ -21,6 +21,7 @@ enum class StoreKind { multi, single };
 
 struct StoreOptions {
   StoreKind kind = StoreKind::multi;
+  int dimension = 64;             ///< numbers of a descriptor: 64, 128 or 256
   double ratio = 1.25;            ///< second best over best distance that a match needs
   double max_distance = 0.45;     ///< largest distance of unit descriptors
   std::size_t leaves = 64;        ///< budget of a search
@@ -55,6 +56,7 @@ public:
                                                                      unsigned threads) const = 0;
 };
 
+/// Throws cairn::Error where there is no store for the dimension.
 [[nodiscard]] std::unique_ptr<LandmarkStore> make_landmark_store(const StoreOptions& options);
 
 }  // namespace stereo_slam

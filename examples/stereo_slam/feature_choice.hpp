@@ -1,0 +1,40 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The interest points of a run, chosen at run time: cairn's SURF, or OpenCV's SIFT or ORB where OpenCV was
+/// found when building.
+#pragma once
+
+#include <functional>
+
+#include <cairn/vision/features.hpp>
+
+namespace stereo_slam {
+
+enum class FeatureKind { surf, sift, orb };
+
+/// Whether make_extractor() has more than SURF to offer.
+[[nodiscard]] bool built_with_opencv() noexcept;
+
+/// Numbers a descriptor of this kind has.
+[[nodiscard]] constexpr int dimension_of(FeatureKind kind) noexcept {
+  return kind == FeatureKind::surf ? 64 : kind == FeatureKind::sift ? 128 : 256;
+}
+
+struct FeatureOptions {
+  FeatureKind kind = FeatureKind::surf;
+  int points = 2000;             ///< kept in an image
+  float surf_threshold = 10.0F;  ///< least response of SURF [(grey levels)^2]
+  bool oriented = false;         ///< SURF with orientation; the others always have one
+  unsigned threads = 1;          ///< of SURF; the points do not depend on it
+};
+
+/// Any FeatureExtractor behind one type.
+using Extractor = std::function<const cairn::Features&(cairn::ImageView)>;
+static_assert(cairn::FeatureExtractor<Extractor>);
+
+/// Throws cairn::Error where the kind needs OpenCV and there is none.
+[[nodiscard]] Extractor make_extractor(const FeatureOptions& options);
+
+}  // namespace stereo_slam
