@@ -130,14 +130,12 @@ public:
 private:
   std::vector<TwoNearest> search(const cairn::PrincipalAxes& axes, const std::vector<float>& queries,
                                  cairn::Budget budget) {
-    std::vector<const Tree*> trees;
-    for (const Tree& tree : index_.trees()) trees.push_back(&tree);
     std::vector<TwoNearest> found;
     float turned[64];
     for (std::size_t i = 0; i < queries.size(); i += 64) {
       axes.turn(&queries[i], turned);
       cairn::NearestTwo<float> two;
-      search_.search(trees, turned, two, budget);
+      search_.search(index_.trees(), turned, two, budget);
       found.push_back({two.id(), std::sqrt(two.first()), std::sqrt(two.second())});
     }
     return found;

@@ -83,6 +83,7 @@ private:
     parts_.blocks = LeafBlocks<Scalar>(dim_, layout);
     if (dim_ <= few_axes) parts_.boxes = BoxTree<Scalar>(dim_, layout);
     if (layout.points() > 0) todo_.push_back({0, 0});
+    todo_.reserve(2 * 64);  // so that nothing can fail between a split and its children
     stage_ = todo_.empty() ? Stage::done : Stage::splitting;
   }
 

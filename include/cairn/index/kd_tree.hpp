@@ -189,7 +189,7 @@ private:
     detail::check_metric(metric_, dimension());
     if constexpr (detail::HasPeriods<M>) {
       static_assert(std::floating_point<Scalar>, "coordinates on circles must be floating point numbers");
-      rows = detail::wrapped_rows(metric_, dimension(), rows);
+      rows = detail::wrapped_rows(metric_, dimension(), std::move(rows));
     }
     detail::KdBuilder<Scalar, Dim> builder(dimension());
     builder.take(std::move(rows), ids, threads);

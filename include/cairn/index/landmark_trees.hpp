@@ -149,7 +149,7 @@ public:
   /// The trees to search.
   [[nodiscard]] TreeList<Tree> list() const noexcept {
     TreeList<Tree> trees;
-    for (const Tree& tree : base_.trees()) trees.add(tree);
+    for (const Tree* tree : base_.trees()) trees.add(*tree);
     trees.add(probation_.tree());
     return trees;
   }

@@ -10,13 +10,17 @@
 /// New points go into tree 1; a tree that would exceed its maximum is poured into the next. With m insertions
 /// and s queries a step that costs O(m q p log n) amortised, p <= log_q(n / n1) + 2 trees, against O(n log n)
 /// for rebuilding one tree; a query costs less than p searches, since all trees share one bound. Erased
-/// points are marked, and dropped at the next merge, or when half of all are dead.
+/// points are marked, and dropped at the next merge, or when half of all are dead. The binary counter is to
+/// be had as well, and merging that takes no step long (multi_tree_shape.hpp).
+///
+/// Const methods may run at the same time, on any threads, also while a merge is under way in the background;
+/// not during a call of insert, erase, rebuild or finish_merges. To go on answering during those, answer from
+/// a copy: copies share the trees, so making one takes a byte a point.
 #pragma once
 
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <span>
 #include <string>
@@ -25,17 +29,12 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/index/kd_tree.hpp>
+#include <cairn/index/multi_tree_shape.hpp>
+#include <cairn/index/tree_forest.hpp>
 
 namespace cairn::inline CAIRN_ABI {
 
-/// Sizes of the trees: the first holds up to first_size (n1), each further one `growth` (q) times more.
-struct MultiTreeShape {
-  std::size_t first_size = 4096;
-  std::size_t growth = 2;
-};
-
-/// Arguments as KdTree. Ids stay valid until erased, and are never given twice. Const methods may run at the
-/// same time.
+/// Arguments as KdTree. Ids stay valid until erased, and are never given twice.
 template <class Scalar = float, std::size_t Dim = dynamic_dim, class M = L2>
 class MultiKdTree {
 public:
@@ -44,9 +43,9 @@ public:
   using Hit = typename Tree::Hit;
 
   /// An empty index; with dynamic_dim the first point inserted fixes the dimension.
-  explicit MultiKdTree(MultiTreeShape shape = {}, M metric = {}) : shape_(shape), metric_(std::move(metric)) {
-    CAIRN_EXPECTS(shape.first_size >= 1, "MultiKdTree: the first tree must have room for a point");
-    CAIRN_EXPECTS(shape.growth >= 2, "MultiKdTree: trees must grow by a factor of at least 2");
+  explicit MultiKdTree(MultiTreeShape shape = {}, M metric = {})
+      : metric_(std::move(metric)), forest_(shape) {
+    detail::check_shape(shape);
   }
 
   /// Points that are stored and not erased.
@@ -54,22 +53,21 @@ public:
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
   [[nodiscard]] std::size_t dimension() const noexcept { return Dim != dynamic_dim ? Dim : dim_; }
   [[nodiscard]] const M& metric() const noexcept { return metric_; }
-  [[nodiscard]] const MultiTreeShape& shape() const noexcept { return shape_; }
-  /// The trees, smallest first; some may be empty.
-  [[nodiscard]] std::span<const Tree> trees() const noexcept { return trees_; }
+  [[nodiscard]] const MultiTreeShape& shape() const noexcept { return forest_.shape(); }
+  /// The trees, smallest first, none empty; those that are being merged stand for the result.
+  [[nodiscard]] std::span<const Tree* const> trees() const noexcept { return forest_.trees(); }
+  /// Merges that were started and whose result is not yet in use.
+  [[nodiscard]] std::size_t merges_under_way() const noexcept { return forest_.merges_under_way(); }
   /// Points written into trees so far, by insertions and merges: the work of updating.
-  [[nodiscard]] std::uint64_t points_moved() const noexcept { return points_moved_; }
-  [[nodiscard]] bool contains(PointId id) const noexcept { return id < state_.size() && state_[id] == live; }
-
-  /// Largest size of tree i (the first is 0); the largest number for trees that nothing can overflow.
-  [[nodiscard]] std::size_t capacity(std::size_t i) const noexcept {
-    std::size_t capacity = shape_.first_size;
-    for (; i > 0; --i) {
-      if (capacity > std::numeric_limits<std::size_t>::max() / shape_.growth)
-        return std::numeric_limits<std::size_t>::max();
-      capacity *= shape_.growth;
-    }
-    return capacity;
+  [[nodiscard]] std::uint64_t points_moved() const noexcept { return forest_.points_moved(); }
+  [[nodiscard]] bool contains(PointId id) const noexcept {
+    return id < state_.size() && state_[id] == PointState::live;
+  }
+  /// Memory held, the points included, without that of merges under way.
+  [[nodiscard]] std::size_t bytes() const noexcept {
+    std::size_t bytes = state_.capacity();
+    for (const Tree* tree : trees()) bytes += tree->bytes();
+    return bytes;
   }
 
   /// Adds points under new consecutive ids; returns the first. Throws as KdTree does, leaving the index as it
@@ -91,27 +89,31 @@ public:
     const std::size_t dim = dimension() != 0 ? dimension() : detail::dimension_of<Dim>(points);
     std::vector<Scalar> rows = detail::copy_points<Scalar>(points, dim, "MultiKdTree: point");
     Entering marks(state_, ids);
-    pour(std::move(rows), {ids.begin(), ids.end()}, dim);
+    const std::uint64_t now = updates_ + ids.size();
+    forest_.advance(now);
+    forest_.add({std::move(rows), {ids.begin(), ids.end()}}, {dim, metric_, state_, live_, now});
     marks.commit();
+    dim_ = dim;
     live_ += ids.size();
+    updates_ = now;
   }
 
-  /// Forgets a point; false where there is none of that id. O(1), and O(n log n) each time half are dead.
+  /// Forgets a point; false where there is none of that id. O(1), and O(n log n) each time half are dead, or
+  /// as a merge where merges are not done at once.
   bool erase(PointId id) {
     if (!contains(id)) return false;
-    state_[id] = erased;
+    state_[id] = PointState::erased;
     --live_;
-    if (2 * live_ < stored_) rebuild();
+    forest_.advance(++updates_);
+    if (2 * live_ < forest_.stored()) forest_.shrink({dimension(), metric_, state_, live_, updates_});
     return true;
   }
 
   /// Drops what is erased and puts all points into one tree.
-  void rebuild() {
-    std::vector<Scalar> rows;
-    std::vector<PointId> ids;
-    for (const Tree& tree : trees_) take_live(tree, rows, ids);
-    place(rows, ids, dimension(), trees_.size());
-  }
+  void rebuild() { forest_.rebuild({dimension(), metric_, state_, live_, updates_}); }
+
+  /// Ends all merges under way.
+  void finish_merges() { forest_.finish_merges(); }
 
   template <Point Query>
   [[nodiscard]] std::optional<Hit> nearest(const Query& query) const {
@@ -147,96 +149,63 @@ public:
   /// Exact search through all trees, the largest first, with one collector and so one bound.
   template <Point Query, Collector<Real> C>
   void search(const Query& query, C& collector, Work* work = nullptr) const {
-    if (live_ == stored_) return search_trees(query, collector, work);
+    if (live_ == forest_.stored()) return search_trees(query, collector, work);
     OnlyLive<C> only_live{&state_, &collector};
     search_trees(query, only_live, work);
   }
 
 private:
-  enum State : std::uint8_t { unknown, entering, live, erased };
+  using PointState = detail::PointState;
+  static_assert(sizeof(PointState) == 1);
 
   /// Passes on what is not erased.
   template <class C>
   struct OnlyLive {
-    const std::vector<std::uint8_t>* state;
+    const std::vector<PointState>* state;
     C* collector;
     [[nodiscard]] Real limit() const { return static_cast<Real>(collector->limit()); }
     void offer(PointId id, Real reduced) {
-      if ((*state)[id] == live) collector->offer(id, reduced);
+      if ((*state)[id] == PointState::live) collector->offer(id, reduced);
     }
   };
 
   template <Point Query, class C>
   void search_trees(const Query& query, C& collector, Work* work) const {
-    for (std::size_t i = trees_.size(); i-- > 0;) trees_[i].search(query, collector, work);
+    const auto all = trees();
+    for (std::size_t i = all.size(); i-- > 0;) all[i]->search(query, collector, work);
   }
 
   /// Marks the ids of an insertion; takes the marks back unless the insertion went through.
   class Entering {
   public:
-    Entering(std::vector<std::uint8_t>& state, std::span<const PointId> ids) : state_(state), ids_(ids) {
+    Entering(std::vector<PointState>& state, std::span<const PointId> ids) : state_(state), ids_(ids) {
       const PointId last = *std::max_element(ids.begin(), ids.end());
       CAIRN_EXPECTS(last != no_point, "MultiKdTree::insert: no_point is not an id");
-      if (last >= state.size()) state.resize(std::size_t{last} + 1, unknown);
+      if (last >= state.size()) state.resize(std::size_t{last} + 1, PointState::unknown);
       for (const PointId id : ids) {
-        CAIRN_EXPECTS(state[id] == unknown, "MultiKdTree::insert: an id can be given only once");
-        state[id] = entering;
+        CAIRN_EXPECTS(state[id] == PointState::unknown, "MultiKdTree::insert: an id can be given only once");
+        state[id] = PointState::entering;
       }
     }
     Entering(const Entering&) = delete;
     Entering& operator=(const Entering&) = delete;
     ~Entering() {
-      for (const PointId id : ids_) state_[id] = committed_ ? live : unknown;
+      for (const PointId id : ids_) state_[id] = committed_ ? PointState::live : PointState::unknown;
     }
     void commit() noexcept { committed_ = true; }
 
   private:
-    std::vector<std::uint8_t>& state_;
+    std::vector<PointState>& state_;
     std::span<const PointId> ids_;
     bool committed_ = false;
   };
 
-  void take_live(const Tree& tree, std::vector<Scalar>& rows, std::vector<PointId>& ids) const {
-    tree.for_each([&](PointId id, std::span<const Scalar> row) {
-      if (state_[id] != live) return;
-      ids.push_back(id);
-      rows.insert(rows.end(), row.begin(), row.end());
-    });
-  }
-
-  /// Collects the trees from the first on until the next has room for all that was collected.
-  void pour(std::vector<Scalar> rows, std::vector<PointId> ids, std::size_t dim) {
-    std::size_t taken = 0;
-    while (taken < trees_.size()) {
-      take_live(trees_[taken], rows, ids);
-      if (ids.size() <= capacity(taken++)) break;
-    }
-    place(rows, ids, dim, taken);
-  }
-
-  /// Replaces the first `taken` trees by one of these points, where the invariant wants it.
-  void place(const std::vector<Scalar>& rows, const std::vector<PointId>& ids, std::size_t dim,
-             std::size_t taken) {
-    std::size_t level = 0;
-    while (capacity(level) < ids.size()) ++level;
-    Tree merged = Tree::from_rows(rows, dim, ids, metric_);
-    if (trees_.size() <= level) trees_.resize(level + 1);
-    for (std::size_t i = 0; i < taken; ++i) trees_[i] = Tree();
-    trees_[level] = std::move(merged);
-    dim_ = dim;
-    points_moved_ += ids.size();
-    stored_ = 0;
-    for (const Tree& tree : trees_) stored_ += tree.size();
-  }
-
-  MultiTreeShape shape_;
   [[no_unique_address]] M metric_;
   std::size_t dim_ = 0;
-  std::vector<Tree> trees_;
-  std::vector<std::uint8_t> state_;
-  std::size_t stored_ = 0;
+  detail::TreeForest<Tree> forest_;
+  std::vector<PointState> state_;
   std::size_t live_ = 0;
-  std::uint64_t points_moved_ = 0;
+  std::uint64_t updates_ = 0;  ///< points inserted and erased so far
 };
 
 }  // namespace cairn::inline CAIRN_ABI
