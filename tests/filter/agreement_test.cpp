@@ -110,6 +110,31 @@ TEST_SUITE("agreement") {
   TEST_CASE("gaussian filters: agree on linear problems in double") {
     all_agree<4, 2, double>(1e-11);
   }
+  TEST_CASE("gaussian filters: fading memory and stabilising noise mean the same in every form") {
+    cairn::Random random(cairn_test::seed());
+    const Record<4, 2, double> record(random);
+    const auto& p = record.problem;
+    auto expected = p.prior;
+    REQUIRE(cairn::Kalman{.fading = 1.3, .stabilising_noise = 0.2}.predict(expected, p.process, 1.0) ==
+            Status::accepted);
+    const auto check = [&](const auto& filter, auto belief) {
+      REQUIRE(filter.predict(belief, p.process, 1.0) == Status::accepted);
+      const auto plain = as_gaussian<decltype(belief), 4, double>(belief);
+      CHECK(relative_error(plain.covariance, expected.covariance) < 1e-11);
+      auto wrong = filter;
+      wrong.fading = 0.9;
+      CHECK(wrong.predict(belief, p.process, 1.0) == Status::bad_option);
+      wrong = filter;
+      wrong.stabilising_noise = std::nan("");
+      CHECK(wrong.predict(belief, p.process, 1.0) == Status::bad_option);
+    };
+    const auto root = cairn::SquareRootGaussian<Vector<4>>::from(p.prior);
+    check(cairn::Unscented{.fading = 1.3, .stabilising_noise = 0.2}, p.prior);
+    check(cairn::SquareRoot{.fading = 1.3, .stabilising_noise = 0.2}, root);
+    check(cairn::SquareRootUnscented{.fading = 1.3, .stabilising_noise = 0.2}, root);
+    check(cairn::InformationFilter{.fading = 1.3, .stabilising_noise = 0.2},
+          cairn::InformationBelief<Vector<4>>::from(p.prior).value());
+  }
   TEST_CASE("gaussian filters: agree on linear problems in float") {
     all_agree<2, 1, float>(5e-4);
   }

@@ -205,6 +205,16 @@ inline Innovation<M, ScalarOf<X>> correct(Gaussian<X>& belief, const H& h, const
   return candidate.innovation;
 }
 
+/// Q with the stabilising noise, if the options are in range and it is a covariance.
+template <Manifold X>
+[[nodiscard]] Status stabilise(CovarianceOf<X>& q, double fading, double stabilising_noise) {
+  using S = ScalarOf<X>;
+  if (!(fading >= 1.0) || !(stabilising_noise >= 0.0)) return Status::bad_option;
+  for (int i = 0; i < static_cast<int>(q.rows()); ++i) q(i, i) += static_cast<S>(stabilising_noise);
+  if (!all_finite(q)) return Status::not_finite;
+  return is_valid_covariance<dof<X>, S>(q) ? Status::accepted : Status::not_positive_definite;
+}
+
 /// The covariance part of a prediction: fading * F P F^T + Q + extra I, kept with the mean if both are sound.
 template <Manifold X, class F>
 inline Status advance(Gaussian<X>& belief, const X& mean, const F& f, const CovarianceOf<X>& q, double fading,

@@ -90,6 +90,9 @@ template <int N, int C, class S>
 
 /// Information filter for linear and linearised models. Options only.
 struct InformationFilter {
+  double fading = 1.0;             ///< fading memory: F P F^T is multiplied by this each step; >= 1
+  double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
+
   /// Moves the belief by one step of dt. The mean of what is known is moved by the process first, so the
   /// point of linearisation follows the estimate. Refused: a singular F.
   template <LinearisedProcess F>
@@ -103,14 +106,17 @@ struct InformationFilter {
     recentre(next);
     const int size = static_cast<int>(next.vector.size());
     const CovarianceOf<X> f = detail::dense_of(process.jacobian(next.point, control, dt));
-    const CovarianceOf<X> q = process.noise(next.point, control, dt);
-    const CovarianceOf<X> g = detail::semi_definite_root<n, S>(q);
+    CovarianceOf<X> q = process.noise(next.point, control, dt);
     CovarianceOf<X> inverse = CovarianceOf<X>::Identity(size, size);
     if (f.rows() != size || q.rows() != size) return Status::size_mismatch;
+    if (!(fading >= 1.0) || !(stabilising_noise >= 0.0)) return Status::bad_option;
+    for (int i = 0; i < size; ++i) q(i, i) += static_cast<S>(stabilising_noise);
+    const CovarianceOf<X> g = detail::semi_definite_root<n, S>(q);
     if (!detail::all_finite(f) || !detail::all_finite(q)) return Status::not_finite;
     if (!detail::solve_square<n, n, S>(f, inverse)) return Status::not_positive_definite;
-    const CovarianceOf<X> m = symmetrised(inverse.transpose() * next.information * inverse);
-    const Tangent<X> y = inverse.transpose() * next.vector;
+    const S kept = S(1) / static_cast<S>(fading);
+    const CovarianceOf<X> m = kept * symmetrised(inverse.transpose() * next.information * inverse);
+    const Tangent<X> y = kept * (inverse.transpose() * next.vector);
     const CovarianceOf<X> mg = m * g;
     const CovarianceOf<X> inner = CovarianceOf<X>::Identity(size, size) + g.transpose() * mg;
     const Eigen::LLT<CovarianceOf<X>> root(inner);

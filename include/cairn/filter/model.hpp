@@ -85,4 +85,11 @@ template <class F, class H>
 concept StateModel =
     ProcessModel<F> && MeasurementModel<H> && std::same_as<typename F::State, typename H::State>;
 
+namespace detail {
+
+/// A + B, where both are known at compile time.
+template <int A, int B>
+inline constexpr int size_sum = A == dynamic || B == dynamic ? dynamic : A + B;
+
+}  // namespace detail
 }  // namespace cairn::inline CAIRN_ABI

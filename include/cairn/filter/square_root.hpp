@@ -75,9 +75,6 @@ void triangularise(Matrix<C, R, S>& a) {
   }
 }
 
-template <int A, int B>
-inline constexpr int size_sum = A == dynamic || B == dynamic ? dynamic : A + B;
-
 /// The transpose of the upper triangle of `array` that starts at (from, from).
 template <class Root, class Array>
 [[nodiscard]] Root lower_part(const Array& array, int from, int size) {
@@ -140,22 +137,26 @@ template <Manifold X, int M, class Array>
 /// Square-root form of the Kalman and extended Kalman filters. Options only.
 struct SquareRoot {
   double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
+  double fading = 1.0;             ///< fading memory: the propagated P is multiplied by this; >= 1
+  double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
 
   template <LinearisedProcess F>
   Status predict(SquareRootGaussian<typename F::State>& belief, const F& process,
                  const typename F::Control& control, double dt) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
+    using std::sqrt;
     constexpr int n = dof<X>;
     if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
     const int size = static_cast<int>(belief.root.rows());
     const CovarianceOf<X> f = detail::dense_of(process.jacobian(belief.mean, control, dt));
-    const CovarianceOf<X> q = process.noise(belief.mean, control, dt);
+    CovarianceOf<X> q = process.noise(belief.mean, control, dt);
     if (f.cols() != size || f.rows() != size || q.rows() != size) return Status::size_mismatch;
-    if (!detail::all_finite(q)) return Status::not_finite;
-    if (!detail::is_valid_covariance<n, S>(q)) return Status::not_positive_definite;
+    const Status status = detail::stabilise<X>(q, fading, stabilising_noise);
+    if (status != Status::accepted) return status;
     Matrix<detail::size_sum<n, n>, n, S> array(2 * size, size);
     array.topRows(size) = (f * belief.root).transpose();
+    if (fading != 1.0) array.topRows(size) *= sqrt(static_cast<S>(fading));
     array.bottomRows(size) = detail::semi_definite_root<n, S>(q).transpose();
     detail::triangularise(array);
     return detail::keep_root(belief, X(process.propagate(belief.mean, control, dt)), array, size);
@@ -200,23 +201,27 @@ struct SquareRoot {
 struct SquareRootUnscented {
   SigmaPoints points{};
   double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
+  double fading = 1.0;             ///< fading memory: the propagated P is multiplied by this; >= 1
+  double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
 
   template <ProcessModel F>
   Status predict(SquareRootGaussian<typename F::State>& belief, const F& process,
                  const typename F::Control& control, double dt) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
+    using std::sqrt;
     constexpr int n = dof<X>;
     if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
     const int size = static_cast<int>(belief.root.rows());
     if (!sound(size)) return Status::bad_option;
-    const CovarianceOf<X> q = process.noise(belief.mean, control, dt);
-    if (!detail::all_finite(q)) return Status::not_finite;
-    if (!detail::is_valid_covariance<n, S>(q)) return Status::not_positive_definite;
+    CovarianceOf<X> q = process.noise(belief.mean, control, dt);
+    const Status status = detail::stabilise<X>(q, fading, stabilising_noise);
+    if (status != Status::accepted) return status;
     constexpr int rows = n == dynamic ? dynamic : 3 * n + 1;
     Matrix<rows, n, S> array(3 * size + 1, size);
     const auto f = [&](const X& x) -> X { return process.propagate(x, control, dt); };
     const X mean = spread(belief, f, array);
+    if (fading != 1.0) array.topRows(2 * size + 1) *= sqrt(static_cast<S>(fading));
     array.bottomRows(size) = detail::semi_definite_root<n, S>(q).transpose();
     detail::triangularise(array);
     return detail::keep_root(belief, mean, array, size);

@@ -1,0 +1,294 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The unscented filter whose points carry the noise too, for noise that is not simply added (driven.hpp).
+///
+/// predict() and update() draw the points of (x, w) and of (x, v), of L = n + q and n + m numbers. step()
+/// does both at once and draws only once: the predicted points, with those of w among them, are extended by
+/// the points of v and go on through the sensor, so that what the motion bent out of a Gaussian is not
+/// forgotten; L = n + q + m. Points without w there would leave Q out of the gain. (S. Julier, J. Uhlmann,
+/// Proc. IEEE 92, 2004; R. van der Merwe, "Sigma-point Kalman filters", thesis, Oregon, 2004, 3.2.) Models of
+/// model.hpp, whose noise is additive, are taken as well. On linear models this is the Kalman filter, and
+/// with additive noise predict() is that of Unscented with kappa larger by q. Sums are those of
+/// sigma_points.hpp:
+///   P_ab = w sum (odd_a odd_b^T + even_a even_b^T) + (beta - alpha^2) m_a m_b^T
+#pragma once
+
+#include <cmath>
+#include <concepts>
+#include <limits>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/filter/driven.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/model.hpp>
+#include <cairn/filter/sigma_points.hpp>
+#include <cairn/filter/status.hpp>
+#include <cairn/filter/unscented.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+namespace detail {
+
+/// Pairs of transformed points by their odd and even parts about the transformed centre, one column a pair.
+template <Manifold Y, int K>
+struct PointPairs {
+  using S = ScalarOf<Y>;
+  Y center;
+  Matrix<dof<Y>, K, S> odd, even;
+  Tangent<Y> shift;  ///< of the mean from the centre
+
+  PointPairs(const Y& y, int pairs)
+      : center(y),
+        odd(Matrix<dof<Y>, K, S>::Zero(dof_of(y), pairs)),
+        even(Matrix<dof<Y>, K, S>::Zero(dof_of(y), pairs)),
+        shift(Tangent<Y>::Zero(dof_of(y))) {}
+
+  void set(int column, const Y& up, const Y& down) {
+    const Tangent<Y> a = local(center, up);
+    const Tangent<Y> b = local(center, down);
+    const Tangent<Y> odd_part = S(0.5) * (a - b);
+    Tangent<Y> even_part = S(0.5) * (a + b);
+    drop_noise<Y>(center, odd_part, even_part);
+    odd.col(column) = odd_part;
+    even.col(column) = even_part;
+    shift += even_part;
+  }
+  [[nodiscard]] Y up(int column) const {
+    return retract(center, Tangent<Y>(even.col(column) + odd.col(column)));
+  }
+  [[nodiscard]] Y down(int column) const {
+    return retract(center, Tangent<Y>(even.col(column) - odd.col(column)));
+  }
+  [[nodiscard]] Y mean() const { return retract(center, shift); }
+  [[nodiscard]] CovarianceOf<Y> covariance(const S& w, const S& extra) const {
+    const CovarianceOf<Y> sum = odd * odd.transpose() + even * even.transpose();
+    return symmetrised(w * sum + extra * (shift * shift.transpose()));
+  }
+};
+
+}  // namespace detail
+
+/// Unscented Kalman filter with augmented noise. Options only: may serve any number of beliefs and threads.
+struct AugmentedUnscented {
+  SigmaPoints points{};                                   ///< n of spread_squared is L, noise included
+  double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
+  double fading = 1.0;             ///< fading memory: the prior P is multiplied by this at each predict; >= 1
+  double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
+
+  /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite, a P or Q that is no
+  /// covariance.
+  template <class F>
+    requires AnyProcess<F>
+  Status predict(Gaussian<typename F::State>& belief, const F& process, const typename F::Control& control,
+                 double dt) const {
+    using S = ScalarOf<typename F::State>;
+    S c(0);
+    const auto pairs = propagated<F>(belief, process, control, dt, 0, c);
+    if (pairs.status != Status::accepted) return pairs.status;
+    return keep(belief, pairs.points, c);
+  }
+  template <class F>
+    requires AnyProcess<F> && std::same_as<typename F::Control, NoControl>
+  Status predict(Gaussian<typename F::State>& belief, const F& process, double dt) const {
+    return predict(belief, process, NoControl{}, dt);
+  }
+
+  /// Takes in the measurement z, or refuses it and leaves the belief as it was.
+  template <class H>
+    requires AnyMeasurement<H>
+  Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
+      Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
+    using X = typename H::State;
+    using S = ScalarOf<X>;
+    using V = typename detail::NoiseOfSensor<H>::type;
+    constexpr int n = dof<X>;
+    constexpr int k = detail::size_sum<n, dof<V>>;
+    const int size = dof_of(belief.mean);
+    CovarianceOf<V> r = sensor.noise(belief.mean), root_r = r;
+    CovarianceOf<X> root = belief.covariance;
+    const int count = size + static_cast<int>(r.rows());
+    S c(0);
+    Status status = belief.covariance.rows() == size ? spread(count, c) : Status::size_mismatch;
+    if (status == Status::accepted) status = roots<X, V>(belief.covariance, root, r, root_r);
+    if (status != Status::accepted) return refused<H>(sensor, belief, z, status);
+    detail::PointPairs<X, k> prior(belief.mean, count);
+    for (int i = 0; i < size; ++i) prior.odd.col(i) = c * root.col(i);
+    return fuse<H, k>(belief, prior, size, sensor, z, root_r, c);
+  }
+
+  /// One predict and one update with points drawn once. Refused: as either of them; the belief then stays
+  /// where it was before the prediction. No point carries stabilising noise: it has to be zero here.
+  template <class F, class H>
+    requires AnyProcess<F> && AnyMeasurement<H> && std::same_as<typename F::State, typename H::State>
+  Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> step(
+      Gaussian<typename H::State>& belief, const F& process, const typename F::Control& control, double dt,
+      const H& sensor, const typename H::Measurement& z) const {
+    using X = typename H::State;
+    using S = ScalarOf<X>;
+    using W = typename detail::NoiseOfProcess<F>::type;
+    using V = typename detail::NoiseOfSensor<H>::type;
+    constexpr int moved = detail::size_sum<dof<X>, dof<W>>;
+    constexpr int k = detail::size_sum<moved, dof<V>>;
+    CovarianceOf<V> r = sensor.noise(belief.mean);
+    S c(0);
+    const auto predicted = propagated<F>(belief, process, control, dt, static_cast<int>(r.rows()), c);
+    const int count = static_cast<int>(predicted.points.odd.cols());
+    Gaussian<X> next = belief;
+    Status status = stabilising_noise == 0.0 ? predicted.status : Status::bad_option;
+    if (status == Status::accepted) status = keep(next, predicted.points, c);
+    CovarianceOf<V> root_r = r;
+    if (status == Status::accepted) {
+      r = sensor.noise(predicted.points.center);
+      status = noise_root<V>(r, root_r);
+    }
+    if (status != Status::accepted) return refused<H>(sensor, belief, z, status);
+    detail::PointPairs<X, k> prior(predicted.points.center, count + static_cast<int>(r.rows()));
+    prior.odd.leftCols(count) = predicted.points.odd;
+    prior.even.leftCols(count) = predicted.points.even;
+    prior.shift = predicted.points.shift;
+    auto innovation = fuse<H, k>(next, prior, count, sensor, z, root_r, c);
+    if (innovation.accepted()) belief = next;
+    return innovation;
+  }
+
+private:
+  template <Manifold X, int K>
+  struct Propagated {
+    detail::PointPairs<X, K> points;
+    Status status;
+  };
+
+  template <class S>
+  [[nodiscard]] S extra() const {
+    return static_cast<S>(points.beta - points.alpha * points.alpha);
+  }
+
+  /// c for `count` numbers: never so near that the points drown in rounding (sigma_points.hpp).
+  template <class S>
+  Status spread(int count, S& c) const {
+    using std::sqrt;
+    const double squared = points.spread_squared(count);
+    if (!(squared > 0.0) || !(fading >= 1.0) || !(stabilising_noise >= 0.0)) return Status::bad_option;
+    const S nearest = sqrt(sqrt(std::numeric_limits<S>::epsilon()));
+    const S wanted = sqrt(static_cast<S>(squared));
+    c = wanted > nearest ? wanted : nearest;
+    return Status::accepted;
+  }
+
+  /// Roots of the covariances of the state and of the noise.
+  template <Manifold X, Manifold V>
+  static Status roots(const CovarianceOf<X>& p, CovarianceOf<X>& root_p, const CovarianceOf<V>& r,
+                      CovarianceOf<V>& root_r) {
+    if (!detail::all_finite(p)) return Status::not_finite;
+    if (!detail::checked_root<dof<X>, ScalarOf<X>>(p, root_p)) return Status::not_positive_definite;
+    return noise_root<V>(r, root_r);
+  }
+  template <Manifold V>
+  static Status noise_root(const CovarianceOf<V>& r, CovarianceOf<V>& root) {
+    if (!detail::all_finite(r)) return Status::not_finite;
+    const CovarianceOf<V> symmetric = symmetrised(r);
+    return detail::checked_root<dof<V>, ScalarOf<V>>(symmetric, root) ? Status::accepted
+                                                                      : Status::not_positive_definite;
+  }
+
+  /// The points of (x, w) after the motion; `further` numbers of noise are still to come.
+  template <class F>
+  auto propagated(const Gaussian<typename F::State>& belief, const F& process,
+                  const typename F::Control& control, double dt, int further,
+                  ScalarOf<typename F::State>& c) const {
+    using X = typename F::State;
+    using S = ScalarOf<X>;
+    using W = typename detail::NoiseOfProcess<F>::type;
+    constexpr int k = detail::size_sum<dof<X>, dof<W>>;
+    const int n = dof_of(belief.mean);
+    const CovarianceOf<W> q = process.noise(belief.mean, control, dt);
+    const int count = n + static_cast<int>(q.rows());
+    Tangent<W> w = Tangent<W>::Zero(q.rows());
+    Propagated<X, k> out{{detail::driven(process, belief.mean, control, w, dt), count}, Status::accepted};
+    CovarianceOf<X> root = belief.covariance;
+    CovarianceOf<W> root_q = q;
+    out.status = spread(count + further, c);
+    if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) out.status = Status::bad_time_step;
+    if (belief.covariance.rows() != n) out.status = Status::size_mismatch;
+    if (out.status == Status::accepted) out.status = roots<X, W>(belief.covariance, root, q, root_q);
+    if (out.status != Status::accepted) return out;
+    using std::sqrt;
+    const S wider = c * sqrt(static_cast<S>(fading));
+    for (int i = 0; i < n; ++i) {
+      const Tangent<X> d = wider * root.col(i);
+      out.points.set(i, detail::driven(process, retract(belief.mean, d), control, w, dt),
+                     detail::driven(process, retract(belief.mean, Tangent<X>(-d)), control, w, dt));
+    }
+    for (int i = n; i < count; ++i) {
+      w = c * root_q.col(i - n);
+      const X up = detail::driven(process, belief.mean, control, w, dt);
+      w = -w;
+      out.points.set(i, up, detail::driven(process, belief.mean, control, w, dt));
+    }
+    out.points.shift /= c * c;
+    return out;
+  }
+
+  /// Mean and covariance of the points, kept if they are sound.
+  template <Manifold X, int K>
+  Status keep(Gaussian<X>& belief, const detail::PointPairs<X, K>& pairs, const ScalarOf<X>& c) const {
+    using S = ScalarOf<X>;
+    CovarianceOf<X> covariance = pairs.covariance(S(1) / (c * c), extra<S>());
+    for (int i = 0; i < static_cast<int>(covariance.rows()); ++i)
+      covariance(i, i) += static_cast<S>(stabilising_noise);
+    const X mean = pairs.mean();
+    if (!detail::all_finite(covariance) || !detail::finite_state(mean)) return Status::not_finite;
+    if (!detail::is_valid_covariance<dof<X>, S>(covariance)) return Status::not_positive_definite;
+    belief.mean = mean;
+    belief.covariance = covariance;
+    return Status::accepted;
+  }
+
+  /// The first `count` pairs of `prior` and the noise's own through the sensor, and the update.
+  template <class H, int K>
+  auto fuse(Gaussian<typename H::State>& belief, const detail::PointPairs<typename H::State, K>& prior,
+            int count, const H& sensor, const typename H::Measurement& z,
+            const CovarianceOf<typename detail::NoiseOfSensor<H>::type>& root_r,
+            const ScalarOf<typename H::State>& c) const {
+    using X = typename H::State;
+    using Z = typename H::Measurement;
+    using S = ScalarOf<X>;
+    using V = typename detail::NoiseOfSensor<H>::type;
+    Tangent<V> v = Tangent<V>::Zero(root_r.rows());
+    const int all = count + static_cast<int>(root_r.rows());
+    detail::PointPairs<Z, K> seen(detail::sensed(sensor, prior.center, v), all);
+    for (int i = 0; i < count; ++i)
+      seen.set(i, detail::sensed(sensor, prior.up(i), v), detail::sensed(sensor, prior.down(i), v));
+    for (int i = count; i < all; ++i) {
+      v = c * root_r.col(i - count);
+      const Z up = detail::sensed(sensor, prior.center, v);
+      v = -v;
+      seen.set(i, up, detail::sensed(sensor, prior.center, v));
+    }
+    const S w = S(1) / (c * c);
+    seen.shift *= w;
+    const Matrix<dof<X>, dof<Z>, S> sum =
+        prior.odd * seen.odd.transpose() + prior.even * seen.even.transpose();
+    const Matrix<dof<X>, dof<Z>, S> cross = w * sum + extra<S>() * (prior.shift * seen.shift.transpose());
+    return detail::correct_by_moments<X, dof<Z>>(belief, cross, seen.covariance(w, extra<S>()),
+                                                 local(seen.mean(), z), gate);
+  }
+
+  template <class H>
+  static auto refused(const H& sensor, const Gaussian<typename H::State>& belief,
+                      const typename H::Measurement& z, Status status) {
+    using Z = typename H::Measurement;
+    using V = typename detail::NoiseOfSensor<H>::type;
+    const V none = Tangent<V>::Zero(sensor.noise(belief.mean).rows());
+    const Tangent<Z> residual = local(Z(detail::sensed(sensor, belief.mean, none)), z);
+    const int m = static_cast<int>(residual.size());
+    auto in = detail::fresh_innovation<dof<Z>, ScalarOf<Z>>(residual, CovarianceOf<Z>::Zero(m, m));
+    in.status = status;
+    return in;
+  }
+};
+
+}  // namespace cairn::inline CAIRN_ABI
