@@ -17,7 +17,9 @@
 #include <concepts>
 #include <cstddef>
 #include <limits>
+#include <set>
 #include <span>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -165,6 +167,38 @@ struct Particles {
     *this = equal(std::move(next));
   }
 };
+
+/// How close KLD sampling comes to the distribution, and its bounds.
+struct KldSampling {
+  double epsilon = 0.05;   ///< Kullback-Leibler distance; > 0
+  double z = 2.326347874;  ///< normal quantile of the confidence, here 99 %
+  std::size_t least = 100;
+  std::size_t most = 100000;
+};
+
+/// Draws particles in proportion to their weights, one by one, until there are as many as
+/// kld_particle_count() asks for the bins they have fallen into: few where the belief is narrow. `bin(state)`
+/// gives a value with operator<, such as an array of rounded coordinates. Refused: no particle or weight, a
+/// bad option.
+template <class X, class Bin>
+Status resample_by_kld(Particles<X>& belief, const KldSampling& options, const Bin& bin, Random& random) {
+  if (belief.states.empty()) return Status::depleted;
+  if (!(options.epsilon > 0.0) || options.most < 1 || options.least > options.most) return Status::bad_option;
+  std::vector<double> sums = belief.weights();
+  for (std::size_t i = 1; i < sums.size(); ++i) sums[i] += sums[i - 1];
+  if (!(sums.back() > 0.0)) return Status::depleted;
+  std::set<std::decay_t<decltype(bin(belief.states.front()))>> bins;
+  std::vector<X> next;
+  std::size_t wanted = options.least;
+  while (next.size() < wanted && next.size() < options.most) {
+    const auto found = std::upper_bound(sums.begin(), sums.end() - 1, random.uniform() * sums.back());
+    next.push_back(belief.states[static_cast<std::size_t>(found - sums.begin())]);
+    if (!bins.insert(bin(next.back())).second) continue;
+    wanted = std::max(options.least, kld_particle_count(bins.size(), options.epsilon, options.z));
+  }
+  belief = Particles<X>::equal(std::move(next));
+  return Status::accepted;
+}
 
 /// `count` equally weighted draws from a Gaussian.
 template <Manifold X>

@@ -1,0 +1,192 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The square-root information filter: the belief as a triangular system R d = b, with Y = R^T R.
+///
+/// Every step is one orthogonal triangularisation, so that Y keeps twice the digits of information.hpp and
+/// cannot lose its definiteness; R may be singular, and no prior is needed:
+///   update    [R b; V^-1/2 H  V^-1/2 (z (-) h)]                 -> [R' b'; 0 e],   V the sensor's noise
+///   predict   [I 0 0; -R F^-1 G  R F^-1  b],   Q = G G^T         -> [* * *; 0 R' b']
+/// (P. Dyer, S. McReynolds, "Extension of square-root filtering to include process noise", J. Optimization
+/// Theory and Applications 3, 1969; G. Bierman, "Factorization Methods for Discrete Sequential Estimation",
+/// 1977, chapters V and VI.) e^2 is what the measurement adds to the sum of squared residuals.
+#pragma once
+
+#include <concepts>
+#include <limits>
+#include <optional>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/information.hpp>
+#include <cairn/filter/model.hpp>
+#include <cairn/filter/square_root.hpp>
+#include <cairn/filter/status.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+namespace detail {
+
+/// Solves the upper triangular root d = b in place; false where a diagonal entry is zero.
+template <int N, int C, class S>
+[[nodiscard]] bool solve_upper(const Matrix<N, N, S>& root, Matrix<N, C, S>& b) {
+  for (int i = static_cast<int>(root.rows()) - 1; i >= 0; --i) {
+    if (!(root(i, i) > S(0))) return false;
+    for (int k = i + 1; k < static_cast<int>(root.rows()); ++k) b.row(i) -= root(i, k) * b.row(k);
+    b.row(i) /= root(i, i);
+  }
+  return true;
+}
+
+}  // namespace detail
+
+/// Truth = retract(point, d); the density of d is exp(-|R d - b|^2 / 2), R upper triangular and possibly
+/// singular.
+template <Manifold X>
+struct SquareRootInformation {
+  using State = X;
+  X point;
+  CovarianceOf<X> root;
+  Tangent<X> vector;
+
+  /// Nothing known, linearised at `x`.
+  [[nodiscard]] static SquareRootInformation ignorant(const X& x) {
+    const int n = dof_of(x);
+    return {x, CovarianceOf<X>::Zero(n, n), Tangent<X>::Zero(n)};
+  }
+  /// The same belief; nothing where the covariance is singular.
+  [[nodiscard]] static std::optional<SquareRootInformation> from(const Gaussian<X>& belief) {
+    using S = ScalarOf<X>;
+    const int n = dof_of(belief.mean);
+    const CovarianceOf<X> lower = detail::semi_definite_root<dof<X>, S>(belief.covariance);
+    CovarianceOf<X> inverse = CovarianceOf<X>::Identity(n, n);  // L^-1, whose square is Y
+    for (int i = 0; i < n; ++i) {
+      if (!(lower(i, i) > S(0))) return std::nullopt;
+      for (int k = 0; k < i; ++k) inverse.row(i) -= lower(i, k) * inverse.row(k);
+      inverse.row(i) /= lower(i, i);
+    }
+    detail::triangularise(inverse);
+    return SquareRootInformation{belief.mean, inverse, Tangent<X>::Zero(n)};
+  }
+  /// Mean and covariance; nothing while some direction has no information.
+  [[nodiscard]] std::optional<Gaussian<X>> gaussian() const {
+    const int n = static_cast<int>(vector.size());
+    CovarianceOf<X> inverse = CovarianceOf<X>::Identity(n, n);
+    Tangent<X> d = vector;
+    if (!detail::solve_upper<dof<X>, dof<X>, ScalarOf<X>>(root, inverse) ||
+        !detail::solve_upper<dof<X>, 1, ScalarOf<X>>(root, d))
+      return std::nullopt;
+    Gaussian<X> result{retract(point, d), symmetrised(inverse * inverse.transpose())};
+    if (!detail::all_finite(result.covariance) || !detail::finite_state(result.mean)) return std::nullopt;
+    return result;
+  }
+};
+
+/// Square-root information filter for linear and linearised models. Options only.
+struct SquareRootInformationFilter {
+  double fading = 1.0;             ///< fading memory: F P F^T is multiplied by this each step; >= 1
+  double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
+
+  /// Moves the belief by one step of dt, and the point of linearisation to the estimate before, where there
+  /// is one. Refused: a singular F. O(n^3).
+  template <LinearisedProcess F>
+  Status predict(SquareRootInformation<typename F::State>& belief, const F& process,
+                 const typename F::Control& control, double dt) const {
+    using X = typename F::State;
+    using S = ScalarOf<X>;
+    using std::sqrt;
+    constexpr int n = dof<X>;
+    if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
+    SquareRootInformation<X> next = belief;
+    recentre(next);
+    const int size = static_cast<int>(next.vector.size());
+    CovarianceOf<X> f = detail::dense_of(process.jacobian(next.point, control, dt));
+    CovarianceOf<X> q = process.noise(next.point, control, dt);
+    if (f.rows() != size || f.cols() != size || q.rows() != size) return Status::size_mismatch;
+    if (!detail::all_finite(f)) return Status::not_finite;
+    const Status status = detail::stabilise<X>(q, fading, stabilising_noise);
+    if (status != Status::accepted) return status;
+    const S faded = sqrt(static_cast<S>(fading));
+    f *= faded;
+    CovarianceOf<X> moved = detail::transposed<n, n, S>(next.root);  // (R F^-1)^T solves F^T y = R^T
+    if (!detail::solve_square<n, n, S>(detail::transposed<n, n, S>(f), moved))
+      return Status::not_positive_definite;
+    constexpr int width = n == dynamic ? dynamic : 2 * n + 1;
+    Matrix<width, width, S> array = Matrix<width, width, S>::Zero(2 * size + 1, 2 * size + 1);
+    const CovarianceOf<X> moved_root = detail::transposed<n, n, S>(moved);
+    array.topLeftCorner(size, size).setIdentity();
+    array.block(size, 0, size, size) = -moved_root * detail::semi_definite_root<n, S>(q);
+    array.block(size, size, size, size) = moved_root;
+    for (int i = 0; i < size; ++i)  // one by one: gcc 12 warns wrongly of a block's end
+      array(size + i, 2 * size) = next.vector(i) / faded;
+    detail::triangularise(array);
+    next.root = array.block(size, size, size, size);
+    for (int i = 0; i < size; ++i) next.vector(i) = array(size + i, 2 * size);
+    next.point = process.propagate(next.point, control, dt);
+    return keep(belief, next);
+  }
+  template <LinearisedProcess F>
+    requires std::same_as<typename F::Control, NoControl>
+  Status predict(SquareRootInformation<typename F::State>& belief, const F& process, double dt) const {
+    return predict(belief, process, NoControl{}, dt);
+  }
+
+  /// Adds the information of the measurement z, linearised at the belief's point. O((n + m) n^2).
+  template <LinearisedMeasurement H>
+  Status update(SquareRootInformation<typename H::State>& belief, const H& sensor,
+                const typename H::Measurement& z) const {
+    using X = typename H::State;
+    using Z = typename H::Measurement;
+    using S = ScalarOf<X>;
+    constexpr int n = dof<X>;
+    constexpr int m = dof<Z>;
+    const Matrix<m, n, S> h = detail::dense_of(sensor.jacobian(belief.point));
+    const Matrix<m, m, S> v = sensor.noise(belief.point);
+    const Vector<m, S> residual = local(Z(sensor.predict(belief.point)), z);
+    const int ns = static_cast<int>(belief.vector.size());
+    const int ms = static_cast<int>(residual.size());
+    if (h.cols() != ns || h.rows() != ms || v.rows() != ms) return Status::size_mismatch;
+    if (!detail::all_finite(v) || !detail::all_finite(h)) return Status::not_finite;
+    constexpr int rows = detail::size_sum<n, m>;
+    Matrix<rows, detail::size_sum<n, 1>, S> array(ns + ms, ns + 1);
+    array.topLeftCorner(ns, ns) = belief.root;
+    array.topRightCorner(ns, 1) = belief.vector;
+    const Matrix<m, m, S> lower = detail::semi_definite_root<m, S>(v);
+    for (int i = 0; i < ms; ++i) {  // V^-1/2 times (H, residual), row by row
+      if (!(lower(i, i) > S(0))) return Status::not_positive_definite;
+      array.block(ns + i, 0, 1, ns) = h.row(i);
+      array(ns + i, ns) = residual(i);
+      for (int k = 0; k < i; ++k) array.row(ns + i) -= lower(i, k) * array.row(ns + k);
+      array.row(ns + i) /= lower(i, i);
+    }
+    detail::triangularise(array);
+    SquareRootInformation<X> next = belief;
+    next.root = array.topLeftCorner(ns, ns);
+    next.vector = array.topRightCorner(ns, 1);
+    return keep(belief, next);
+  }
+
+  /// Moves the point of linearisation to the mean; false, and nothing changed, while that is unknown.
+  template <Manifold X>
+  static bool recentre(SquareRootInformation<X>& belief) {
+    Tangent<X> d = belief.vector;
+    if (!detail::solve_upper<dof<X>, 1, ScalarOf<X>>(belief.root, d) || !detail::all_finite(d)) return false;
+    belief.point = retract(belief.point, d);
+    belief.vector.setZero();
+    return true;
+  }
+
+private:
+  template <Manifold X>
+  static Status keep(SquareRootInformation<X>& belief, const SquareRootInformation<X>& next) {
+    if (!detail::all_finite(next.root) || !detail::all_finite(next.vector) ||
+        !detail::finite_state(next.point))
+      return Status::not_finite;
+    belief = next;
+    return Status::accepted;
+  }
+};
+
+}  // namespace cairn::inline CAIRN_ABI
