@@ -10,7 +10,8 @@
 /// automatic() sends dual numbers through them: one call, exact, for models whose propagate and predict are
 /// templates over the scalar,
 ///   template <class T> Vector<2, T> propagate(const Vector<2, T>& x, const Control& u, double dt) const;
-/// compare_jacobians() holds a model's own Jacobian against both.
+/// check_jacobian() holds a model's own Jacobian against central differences, check_jacobians() all three
+/// against one another.
 #pragma once
 
 #include <concepts>
@@ -117,6 +118,41 @@ template <LinearisedProcess F>
 template <LinearisedMeasurement H>
 [[nodiscard]] JacobianComparison check_jacobian(const H& h, const typename H::State& x) {
   return compare_jacobians(h.jacobian(x), numeric(h).jacobian(x));
+}
+
+/// A model's own Jacobian, dual numbers and central differences, each two compared: the one that agrees with
+/// neither of the others is wrong.
+struct JacobianCheck {
+  JacobianComparison given_automatic;
+  JacobianComparison given_numeric;
+  JacobianComparison automatic_numeric;
+  [[nodiscard]] bool agree(double tolerance = 1e-6) const noexcept {
+    return given_automatic.agrees(tolerance) && given_numeric.agrees(tolerance) &&
+           automatic_numeric.agrees(tolerance);
+  }
+};
+
+namespace detail {
+
+template <class A, class B, class C>
+[[nodiscard]] JacobianCheck check_three(const A& given, const B& by_duals, const C& by_differences) {
+  return {compare_jacobians(given, by_duals), compare_jacobians(given, by_differences),
+          compare_jacobians(by_duals, by_differences)};
+}
+
+}  // namespace detail
+
+/// All three Jacobians of a process whose propagate is a template over the scalar, at (x, u, dt).
+template <LinearisedProcess F>
+[[nodiscard]] JacobianCheck check_jacobians(const F& f, const typename F::State& x,
+                                            const typename F::Control& u, double dt) {
+  return detail::check_three(f.jacobian(x, u, dt), automatic(f).jacobian(x, u, dt),
+                             numeric(f).jacobian(x, u, dt));
+}
+/// All three Jacobians of a sensor whose predict is a template over the scalar, at x.
+template <LinearisedMeasurement H>
+[[nodiscard]] JacobianCheck check_jacobians(const H& h, const typename H::State& x) {
+  return detail::check_three(h.jacobian(x), automatic(h).jacobian(x), numeric(h).jacobian(x));
 }
 
 }  // namespace cairn::inline CAIRN_ABI

@@ -7,8 +7,20 @@
 ///
 /// Robust raises R by the smallest factor >= 1 that brings the NIS down to `limit` (G. Chang, "Robust Kalman
 /// filtering based on Mahalanobis distance as outlier judging criterion", Journal of Geodesy 88, 2014).
+/// Huber and StudentT give the peak of the posterior for a sensor whose errors have heavy tails, by weighing
+/// the measurement anew until its weight settles: R / w(t), t^2 = r^T R^-1 r of the residual after the
+/// update,
+///   Huber     w = min(1, threshold / t)      errors normal in the middle, exponential beyond
+///   StudentT  w = (dof + m) / (dof + t^2)    errors of the multivariate Student distribution
+/// (P. Huber, "Robust estimation of a location parameter", 1964; C. Karlgaard, H. Schaub, "Huber-based
+/// divided difference filtering", J. Guidance 30, 2007; K. Lange, R. Little, J. Taylor, "Robust statistical
+/// modeling using the t distribution", JASA 84, 1989.)
+///
 /// adapted_noise() averages r r^T + H P H^T over the residuals r after the update, which is never indefinite
-/// (A. Mohamed, K. Schwarz, "Adaptive Kalman filtering for INS/GPS", Journal of Geodesy 73, 1999).
+/// (A. Mohamed, K. Schwarz, "Adaptive Kalman filtering for INS/GPS", Journal of Geodesy 73, 1999);
+/// innovated_noise() needs no Jacobian and averages v v^T - H P H^T over the residuals v before it (R. Mehra,
+/// "On the identification of variances and adaptive Kalman filtering", IEEE Trans. Automatic Control 15,
+/// 1970).
 #pragma once
 
 #include <cairn/core/check.hpp>
@@ -72,6 +84,83 @@ struct Robust {
   }
 };
 
+namespace detail {
+
+template <MeasurementModel H>
+[[nodiscard]] auto out_of_range() {
+  Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> innovation;
+  innovation.status = Status::bad_option;
+  return innovation;
+}
+
+/// Repeats the update with R / weight(t) until t, of the residual after it, no longer changes the weight
+/// (expectation-maximisation, or iteratively reweighted least squares: the posterior rises at every round).
+template <class Filter, MeasurementModel H, class Weight>
+auto reweighted_update(const Filter& filter, Gaussian<typename H::State>& belief, const H& sensor,
+                       const typename H::Measurement& z, const Weight& weight) {
+  using Z = typename H::Measurement;
+  using S = ScalarOf<typename H::State>;
+  constexpr int m = dof<Z>;
+  const Gaussian<typename H::State> before = belief;
+  const auto residual_size = [&](const Gaussian<typename H::State>& updated) {
+    const Vector<m, S> r = local(Z(sensor.predict(updated.mean)), z);
+    const Matrix<m, m, S> noise = sensor.noise(updated.mean);
+    using std::sqrt;
+    return sqrt(static_cast<double>(squared_mahalanobis<m, S>(r, noise)));
+  };
+  auto innovation = filter.update(belief, sensor, z);
+  if (!innovation.accepted()) return innovation;
+  double factor = 1.0 / weight(residual_size(belief));
+  for (int step = 0; step < 100; ++step) {
+    Gaussian<typename H::State> next = before;
+    const auto found = filter.update(next, Inflated<H>{sensor, factor}, z);
+    if (!found.accepted()) {
+      belief = before;
+      return found;
+    }
+    belief = next;
+    innovation = found;
+    const double wanted = 1.0 / weight(residual_size(next));
+    const double change = wanted - factor;
+    factor = wanted;
+    if (!((change < 0 ? -change : change) > 1e-9 * wanted)) break;
+  }
+  return innovation;
+}
+
+}  // namespace detail
+
+/// Any filter of Gaussian beliefs, for a sensor with outliers, by Huber's loss. Options only.
+template <class Filter = Extended>
+struct Huber {
+  Filter filter{};
+  double threshold = 1.345;  ///< residual in standard deviations beyond which it counts linearly; > 0
+
+  /// Like filter.update; the innovation and the covariance are those of the weighed R.
+  template <MeasurementModel H>
+  auto update(Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
+    if (!(threshold > 0.0)) return detail::out_of_range<H>();
+    const auto weight = [&](double t) { return t > threshold ? threshold / t : 1.0; };
+    return detail::reweighted_update(filter, belief, sensor, z, weight);
+  }
+};
+
+/// Any filter of Gaussian beliefs, for a sensor whose errors are Student's. Options only.
+template <class Filter = Extended>
+struct StudentT {
+  Filter filter{};
+  double degrees = 4.0;  ///< of freedom, dof above; small for heavy tails; > 0
+
+  /// Like filter.update; the innovation and the covariance are those of the weighed R.
+  template <MeasurementModel H>
+  auto update(Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
+    if (!(degrees > 0.0)) return detail::out_of_range<H>();
+    const int m = dof_of(z);
+    const auto weight = [&](double t) { return (degrees + m) / (degrees + t * t); };
+    return detail::reweighted_update(filter, belief, sensor, z, weight);
+  }
+};
+
 /// R after one more measurement: (1 - rate) R + rate (r r^T + H P H^T), r = z - h(x) with the updated belief.
 /// 0 < rate < 1; about 1 / rate measurements count.
 template <LinearisedMeasurement H>
@@ -85,6 +174,23 @@ template <LinearisedMeasurement H>
   const Tangent<Z> left = local(Z(sensor.predict(updated.mean)), z);
   const CovarianceOf<Z> seen = left * left.transpose() + h * updated.covariance * h.transpose();
   return symmetrised(static_cast<S>(1.0 - rate) * r + static_cast<S>(rate) * seen);
+}
+
+/// R after one more measurement, from its innovation by the R it was taken in with: R + rate (v v^T - S),
+/// which is (1 - rate) R + rate (v v^T - H P H^T). The step is halved until at least half of R is left in
+/// every direction, so that R stays positive definite. 0 < rate < 1; about 1 / rate measurements count.
+template <int M, class S>
+[[nodiscard]] Matrix<M, M, S> innovated_noise(const Matrix<M, M, S>& r, const Innovation<M, S>& innovation,
+                                              double rate) {
+  CAIRN_EXPECTS(rate > 0.0 && rate < 1.0, "innovated_noise needs a rate between 0 and 1");
+  const Matrix<M, M, S> change =
+      innovation.residual * innovation.residual.transpose() - innovation.covariance;
+  if (!detail::all_finite(change)) return r;
+  for (S part = static_cast<S>(rate); part > S(1e-6) * static_cast<S>(rate); part *= S(0.5)) {
+    const Matrix<M, M, S> next = symmetrised(r + part * change);
+    if (detail::is_valid_covariance<M, S>(next - S(0.5) * r)) return next;
+  }
+  return r;
 }
 
 }  // namespace cairn::inline CAIRN_ABI

@@ -28,6 +28,7 @@ enum class [[nodiscard]] Status {
   size_mismatch,          ///< run-time sizes do not fit together
   depleted,               ///< no particle, or no weight, or no mode is left
   not_converged,          ///< an iteration stopped before its tolerance
+  too_old,                ///< the measurement is of a moment before all that is remembered
 };
 
 /// The status as a sentence for a log.
@@ -51,6 +52,8 @@ enum class [[nodiscard]] Status {
       return "refused: no particle or mode has any weight left";
     case Status::not_converged:
       return "refused: the iteration did not converge";
+    case Status::too_old:
+      return "refused: the measurement is older than what is remembered";
   }
   return "unknown status";
 }
@@ -94,7 +97,7 @@ struct [[nodiscard]] Innovation {
     const S two_pi = S(6.283185307179586476925286766559L);
     using std::log;
     return S(-0.5) *
-           (nis + detail::log_determinant(covariance) + static_cast<S>(residual.size()) * log(two_pi));
+           (nis + detail::log_determinant(covariance) + S(static_cast<int>(residual.size())) * log(two_pi));
   }
 };
 

@@ -1,0 +1,183 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// Measurements that come late, out of order, or not at all: a filter over moments instead of over calls.
+///
+///   Timeline<Extended, Unicycle, RangeBearing, Compass> timeline(Extended{}, Unicycle{}, prior, 0.0,
+///   u, 2.0); timeline.steer(u, 1.0);                       // the control from 1.0 s on
+///   timeline.measure(compass, heading, 1.4);
+///   timeline.measure(beacon, z, 1.1);             // late: 1.4 s is taken back and done again
+///   timeline.at(1.5);
+///
+/// The beliefs after the events of the last `horizon` seconds are kept; what comes late is put in its place
+/// and the events after it are repeated, so the belief is exactly that of the filter that got everything in
+/// order (with a prediction to every event's moment), whatever the models. O(events after it); O(1) in order.
+#pragma once
+
+#include <concepts>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/model.hpp>
+#include <cairn/filter/status.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// A belief in time under one process and the sensors H. Allocates; not safe for concurrent use.
+template <class Filter, ProcessModel F, MeasurementModel... H>
+class Timeline {
+public:
+  using State = typename F::State;
+  using Control = typename F::Control;
+
+  /// The belief `prior` at `time` [s], `control` from then on; events may come up to `horizon` [s] late.
+  Timeline(const Filter& filter, const F& process, const Gaussian<State>& prior, double time,
+           const Control& control, double horizon)
+      : filter_(filter), process_(process), horizon_(horizon), base_{time, control, prior} {}
+
+  /// The control is u from `time` until the next such event. Refused: as measure(), or where a prediction is.
+  Status steer(const Control& u, double time) { return insert(Event({time, u, base_.after}, Steering{})); }
+
+  /// Takes in z of `time` and repeats what came after. Refused, and nothing changed: too_old before the
+  /// horizon, and what the filter refuses at that moment. A gated measurement is remembered: what comes later
+  /// for an earlier moment may let it in.
+  template <class Sensor>
+    requires(std::same_as<Sensor, H> || ...)
+  Innovation<dof<typename Sensor::Measurement>, ScalarOf<State>> measure(
+      const Sensor& sensor, const typename Sensor::Measurement& z, double time) {
+    Innovation<dof<typename Sensor::Measurement>, ScalarOf<State>> innovation;
+    innovation.status = accepts(time);
+    if (innovation.status != Status::accepted) return innovation;
+    const Moment& last = before(place(time));
+    Moment now{time, last.control, last.after};
+    innovation.status = advance(now, last.time);
+    if (innovation.status != Status::accepted) return innovation;
+    innovation = filter_.update(now.after, sensor, z);
+    if (!innovation.accepted() && innovation.status != Status::gated) return innovation;
+    const Status status = insert(Event(now, Sighting<Sensor>{sensor, z}));
+    if (status != Status::accepted) innovation.status = status;
+    return innovation;
+  }
+
+  /// Moment of the last event [s], or of the prior.
+  [[nodiscard]] double time() const noexcept { return before(events_.size()).time; }
+  /// The belief after the last event.
+  [[nodiscard]] const Gaussian<State>& belief() const noexcept { return before(events_.size()).after; }
+  /// Number of events remembered.
+  [[nodiscard]] std::size_t size() const noexcept { return events_.size(); }
+
+  /// The belief at `time` from all events up to it; nothing before the horizon, or where the prediction is
+  /// refused.
+  [[nodiscard]] std::optional<Gaussian<State>> at(double time) const {
+    if (accepts(time) != Status::accepted) return std::nullopt;
+    const Moment& last = before(place(time));
+    Moment now{time, last.control, last.after};
+    if (advance(now, last.time) != Status::accepted) return std::nullopt;
+    return now.after;
+  }
+
+private:
+  struct Moment {
+    double time;
+    Control control;  ///< from then on
+    Gaussian<State> after;
+  };
+  struct Steering {};
+  template <class Sensor>
+  struct Sighting {
+    Sensor sensor;
+    typename Sensor::Measurement z;
+  };
+  struct Event : Moment {
+    std::variant<Steering, Sighting<H>...> what;
+    Event(const Moment& moment, std::variant<Steering, Sighting<H>...> happened)
+        : Moment(moment), what(std::move(happened)) {}
+  };
+
+  [[nodiscard]] Status accepts(double time) const {
+    if (!(time - time == 0.0)) return Status::bad_time_step;
+    return time < base_.time ? Status::too_old : Status::accepted;
+  }
+  /// Index of the first event after `time`.
+  [[nodiscard]] std::size_t place(double time) const {
+    std::size_t i = events_.size();
+    while (i > 0 && events_[i - 1].time > time) --i;
+    return i;
+  }
+  [[nodiscard]] const Moment& before(std::size_t i) const noexcept {
+    return i == 0 ? base_ : static_cast<const Moment&>(events_[i - 1]);
+  }
+  /// Moves now.after from `since` to now.time. Events of one moment have no step between them.
+  Status advance(Moment& now, double since) const {
+    if (now.time == since) return Status::accepted;
+    return filter_.predict(now.after, process_, now.control, now.time - since);
+  }
+
+  Status insert(Event event) {
+    const Status allowed = accepts(event.time);
+    if (allowed != Status::accepted) return allowed;
+    const std::size_t first = place(event.time);
+    std::vector<Moment> redone;
+    const Status status = repeat(event, first, redone);
+    if (status != Status::accepted) return status;
+    events_.insert(events_.begin() + static_cast<std::ptrdiff_t>(first), std::move(event));
+    for (std::size_t k = 0; k < redone.size(); ++k) static_cast<Moment&>(events_[first + k]) = redone[k];
+    forget();
+    return Status::accepted;
+  }
+
+  /// The moments of `event` and of all from `first` on, as they are once it is known.
+  Status repeat(const Event& event, std::size_t first, std::vector<Moment>& redone) const {
+    redone.reserve(events_.size() - first + 1);
+    Moment last = before(first);
+    bool steered = false;  // by a later event, from which on the controls are known
+    for (std::size_t k = first; k <= events_.size(); ++k) {
+      const Event& next = k == first ? event : events_[k - 1];
+      const bool steers = std::holds_alternative<Steering>(next.what);
+      steered = steered || (k != first && steers);
+      Moment now{next.time, last.control, last.after};
+      const Status status = advance(now, last.time);
+      if (status != Status::accepted) return status;
+      if (steers || steered) now.control = next.control;
+      apply(next, now.after);
+      redone.push_back(now);
+      last = now;
+    }
+    return Status::accepted;
+  }
+
+  void apply(const Event& event, Gaussian<State>& belief) const {
+    std::visit(
+        [&](const auto& what) {
+          if constexpr (!std::is_same_v<std::decay_t<decltype(what)>, Steering>)
+            static_cast<void>(filter_.update(belief, what.sensor, what.z));
+        },
+        event.what);
+  }
+
+  /// Events older than the horizon become the base.
+  void forget() {
+    const double oldest = time() - horizon_;
+    std::size_t count = 0;
+    while (count < events_.size() && events_[count].time < oldest) ++count;
+    if (count == 0) return;
+    base_ = static_cast<const Moment&>(events_[count - 1]);
+    events_.erase(events_.begin(), events_.begin() + static_cast<std::ptrdiff_t>(count));
+  }
+
+  Filter filter_;
+  F process_;
+  double horizon_;
+  Moment base_;
+  std::vector<Event> events_;
+};
+
+}  // namespace cairn::inline CAIRN_ABI
