@@ -18,11 +18,11 @@ Found found_by(const NearestTwo<float>& two) {
   return {two.id(), std::sqrt(two.first()), std::sqrt(two.second())};
 }
 
-/// Exact search of few numbers, through one tree or several with one bound.
-template <class Tree>
-Found search_exactly(std::span<const Tree> trees, const float* query, std::size_t dim, cairn::Work& work) {
+/// Exact search of few numbers, in a tree or a forest.
+template <class Index>
+Found search_exactly(const Index& index, const float* query, std::size_t dim, cairn::Work& work) {
   NearestTwo<float> two;
-  for (std::size_t i = trees.size(); i-- > 0;) trees[i].search(std::span(query, dim), two, &work);
+  index.search(std::span(query, dim), two, &work);
   return found_by(two);
 }
 
@@ -30,17 +30,15 @@ Found search_exactly(std::span<const Tree> trees, const float* query, std::size_
 template <class Tree>
 class BudgetedSearch {
 public:
-  Found operator()(std::span<const Tree> trees, const float* query, std::size_t leaves, cairn::Work& work) {
-    list_.clear();
-    for (const Tree& tree : trees) list_.push_back(&tree);
+  Found operator()(std::span<const Tree* const> trees, const float* query, std::size_t leaves,
+                   cairn::Work& work) {
     NearestTwo<float> two;
-    search_.search(std::span<const Tree* const>(list_), query, two, {.leaves = leaves}, &work);
+    search_.search(trees, query, two, {.leaves = leaves}, &work);
     return found_by(two);
   }
 
 private:
   cairn::BestBinFirst<Tree> search_;
-  std::vector<const Tree*> list_;
 };
 
 template <std::size_t Dim>
@@ -54,11 +52,9 @@ public:
     moved_ += tree_.size();
   }
   Found search(const float* query) override {
-    const std::span<const cairn::KdTree<float, Dim>> trees(&tree_, 1);
-    if constexpr (Dim == 3)
-      return search_exactly(trees, query, options_.dim, work);
-    else
-      return budgeted_(trees, query, options_.leaves, work);
+    if constexpr (Dim == 3) return search_exactly(tree_, query, options_.dim, work);
+    const cairn::KdTree<float, Dim>* const trees[] = {&tree_};
+    return budgeted_(trees, query, options_.leaves, work);
   }
   [[nodiscard]] std::size_t bytes() const override {
     return tree_.bytes() + rows_.capacity() * sizeof(float);
@@ -82,21 +78,13 @@ public:
   void insert(std::span<const float> rows) override { index_.insert(cairn::Rows<float>(rows, options_.dim)); }
   Found search(const float* query) override {
     if constexpr (Dim == 3)
-      return search_exactly(index_.trees(), query, options_.dim, work);
+      return search_exactly(index_, query, options_.dim, work);
     else
       return budgeted_(index_.trees(), query, options_.leaves, work);
   }
-  [[nodiscard]] std::size_t bytes() const override {
-    std::size_t sum = 0;
-    for (const auto& tree : index_.trees()) sum += tree.bytes();
-    return sum;
-  }
+  [[nodiscard]] std::size_t bytes() const override { return index_.bytes(); }
   [[nodiscard]] std::uint64_t points_moved() const override { return index_.points_moved(); }
-  [[nodiscard]] std::size_t trees() const override {
-    std::size_t filled = 0;
-    for (const auto& tree : index_.trees()) filled += !tree.empty();
-    return filled;
-  }
+  [[nodiscard]] std::size_t trees() const override { return index_.trees().size(); }
 
 private:
   StoreOptions options_;
