@@ -11,6 +11,7 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/parallel.hpp>
 #include <cairn/index/best_bin_first.hpp>
+#include <cairn/index/bulk_match.hpp>
 #include <cairn/index/principal_axes.hpp>
 
 #include "areas.hpp"
@@ -166,6 +167,28 @@ void score_threads(Scoreboard& board, const std::vector<float>& base, const std:
              .note = "needs two idle cores"});
 }
 
+/// All queries at once, exactly, without a tree.
+void score_bulk(Scoreboard& board, const std::string& name, const std::vector<float>& base,
+                const std::vector<float>& queries) {
+  const cairn::PackedPoints packed{cairn::Rows<float>(base, 128)};
+  const auto ours = [&] { return cairn::nearest_two(packed, cairn::Rows<float>(queries, 128)); };
+  const auto expected = search_by_product(base, queries, 128);
+  const auto found = ours();
+  std::size_t wrong = 0;
+  for (std::size_t i = 0; i < found.size(); ++i)
+    wrong += std::abs(found[i].first - expected[i].first) > 1e-3F * expected[i].first + 0.1F;
+  const auto count = static_cast<double>(expected.size());
+  const auto timings =
+      interleave({{"ours", [&] { do_not_optimise(ours()); }, count},
+                  {"matrix product", [&] { do_not_optimise(search_by_product(base, queries, 128)); }, count}},
+                 {.rounds = 7, .seconds_per_round = 0.02});
+  Row row =
+      against_rival(name, timings[0].median * 1e6, ratio(timings[1], timings[0]) * timings[0].median * 1e6,
+                    "matrix product", 1, 2, "us");
+  if (wrong > 0) row.note = std::to_string(wrong) + " answers differ";
+  board.add(row);
+}
+
 }  // namespace
 
 void score_descriptors(Scoreboard& board) {
@@ -180,6 +203,8 @@ void score_descriptors(Scoreboard& board) {
   const std::vector<float> small(data->base.begin(), data->base.begin() + 128 * 10000);
   score_mark<64>(board, "64 of SIFT's numbers, n = 99000: 99 % of matches", first_half(data->base),
                  first_half(data->queries), 0.99, true, 3, 6);
+  score_bulk(board, "SIFT, n = 1e4: exact, all queries at once", small, data->queries);
+  score_bulk(board, "SIFT, n = 99000: exact, all queries at once", data->base, data->queries);
   score_mark<128>(board, "SIFT, n = 1e4: 99 % of matches", small, data->queries, 0.99, true, 2, 4);
   score_mark<128>(board, "SIFT, n = 99000: 99 % of matches", data->base, data->queries, 0.99, true, 3, 6);
   score_mark<128>(board, "SIFT, n = 99000: recall 0.95", data->base, data->queries, 0.95, false, 1.2, 2);
