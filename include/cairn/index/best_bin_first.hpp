@@ -40,31 +40,18 @@ public:
   template <Collector<Real> C>
   bool search(std::span<const Tree* const> trees, const Real* query, C& collector, Budget budget = {},
               Work* work = nullptr) {
-    queue_.clear();
-    turns_.clear();
     query = wrapped(trees, query);
-    Work done;
-    std::size_t leaves = 0;
-    for (std::size_t i = 0; i < trees.size(); ++i)
-      if (trees[i] != nullptr && !trees[i]->empty()) push({0, static_cast<std::uint32_t>(i), 0, 0, no_turn});
-    Real rest = std::numeric_limits<Real>::infinity();  // how near an unvisited cell may be
-    Leaf waiting;  // scanned only after the next one has been asked for, so that memory is not waited for
-    while (!queue_.empty()) {
-      const Cell cell = pop();
-      if (!(cell.bound < static_cast<Real>(collector.limit()))) break;
-      if (leaves == budget.leaves) {
-        rest = cell.bound;
-        break;
-      }
-      ++leaves;
-      const Leaf next{trees[cell.tree], descend(*trees[cell.tree], cell, query, collector, done)};
-      next.tree->prefetch_leaf(next.leaf);
-      if (waiting.tree != nullptr) waiting.tree->scan_leaf(waiting.leaf, query, collector, done);
-      waiting = next;
-    }
-    if (waiting.tree != nullptr) waiting.tree->scan_leaf(waiting.leaf, query, collector, done);
-    if (work != nullptr) *work += done;
-    return !(rest < static_cast<Real>(collector.limit()));
+    return search_each(trees, [query](std::size_t) { return query; }, collector, budget, work);
+  }
+
+  /// The same where each tree holds the points in coordinates of its own: queries[i] is the query in those of
+  /// trees[i]. Distances must mean the same in all of them. Not for axes that are circles.
+  template <Collector<Real> C>
+    requires(!detail::HasPeriods<typename Tree::Measure>)
+  bool search(std::span<const Tree* const> trees, std::span<const Real* const> queries, C& collector,
+              Budget budget = {}, Work* work = nullptr) {
+    CAIRN_EXPECTS(queries.size() == trees.size(), "BestBinFirst: there must be one query a tree");
+    return search_each(trees, [queries](std::size_t i) { return queries[i]; }, collector, budget, work);
   }
 
   /// The same for one tree and any kind of query point, which is checked.
@@ -80,6 +67,36 @@ public:
 private:
   static constexpr std::uint32_t no_turn = 0xffffffffU;
 
+  template <class QueryOf, class C>
+  bool search_each(std::span<const Tree* const> trees, const QueryOf& query_of, C& collector, Budget budget,
+                   Work* work) {
+    queue_.clear();
+    turns_.clear();
+    Work done;
+    std::size_t leaves = 0;
+    for (std::size_t i = 0; i < trees.size(); ++i)
+      if (trees[i] != nullptr && !trees[i]->empty()) push({0, static_cast<std::uint32_t>(i), 0, 0, no_turn});
+    Real rest = std::numeric_limits<Real>::infinity();  // how near an unvisited cell may be
+    Leaf waiting;  // scanned only after the next one has been asked for, so that memory is not waited for
+    while (!queue_.empty()) {
+      const Cell cell = pop();
+      if (!(cell.bound < static_cast<Real>(collector.limit()))) break;
+      if (leaves == budget.leaves) {
+        rest = cell.bound;
+        break;
+      }
+      ++leaves;
+      const Real* const query = query_of(cell.tree);
+      const Leaf next{trees[cell.tree], query, descend(*trees[cell.tree], cell, query, collector, done)};
+      next.tree->prefetch_leaf(next.leaf);
+      if (waiting.tree != nullptr) waiting.tree->scan_leaf(waiting.leaf, waiting.query, collector, done);
+      waiting = next;
+    }
+    if (waiting.tree != nullptr) waiting.tree->scan_leaf(waiting.leaf, waiting.query, collector, done);
+    if (work != nullptr) *work += done;
+    return !(rest < static_cast<Real>(collector.limit()));
+  }
+
   /// A subtree not yet visited: its lower bound (reduced), and the last turn away from the query above it.
   struct Cell {
     Real bound;
@@ -90,6 +107,7 @@ private:
   };
   struct Leaf {
     const Tree* tree = nullptr;
+    const Real* query = nullptr;
     std::size_t leaf = 0;
   };
   /// The path to a cell left the query's side of a split here; `offset` is how far that side is.
