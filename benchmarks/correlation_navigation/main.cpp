@@ -3,7 +3,9 @@
 //
 // The scoreboard of correlation navigation: scripts/scoreboard correlation_navigation.
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <thread>
 #include <vector>
@@ -56,24 +58,42 @@ void add_accuracy_rows(Scoreboard& board, unsigned threads) {
 }
 
 void add_acquisition_rows(Scoreboard& board, unsigned threads) {
-  Row right{.name = "acquired on real terrain within 2 km, 100 starts, 10 % noise",
+  Row first{.name = "acquired on real terrain within 2 km, 5 x 100 starts, 10 % noise, first frame",
             .unit = "%",
             .must = 95,
             .aim = 99,
             .better = larger,
             .rival_name = "no rival"};
+  Row flying{.name = "the same, searching on for up to 5 frames",
+             .unit = "%",
+             .must = 95,
+             .aim = 99,
+             .better = larger,
+             .rival_name = "no rival"};
   Row wrong{.name = "wrong fixes accepted", .unit = "%", .must = 0, .rival_name = "no rival"};
   const auto folder = cairn_test::real_data("terrain");
   if (folder) {
     const auto field = read_terrain(*folder / "srtm_bigtujunga30m_utm11.tif");
-    const AcquisitionResult result = acquire(field, {.threads = threads});
-    right.measured = 100 * result.rate;
-    right.note = "rms " + std::to_string(result.rms_error) + " m";
-    wrong.measured = 100 * result.wrong_rate;
+    double at_first = 0, in_flight = 0, falsely = 0, worst = 1, squares = 0;
+    constexpr std::uint64_t seeds = 5;
+    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+      const AcquisitionResult result = acquire(field, {.seed = seed, .threads = threads});
+      at_first += result.first_rate / seeds;
+      in_flight += result.rate / seeds;
+      falsely += result.wrong_rate / seeds;
+      squares += result.rms_error * result.rms_error / seeds;
+      worst = std::min(worst, result.first_rate);
+    }
+    first.measured = 100 * at_first;
+    first.note = "worst seed " + std::to_string(std::lround(100 * worst)) + " %";
+    flying.measured = 100 * in_flight;
+    flying.note = "rms " + std::to_string(std::sqrt(squares)) + " m";
+    wrong.measured = 100 * falsely;
   } else {
-    right.note = wrong.note = "no data";
+    first.note = flying.note = wrong.note = "no data";
   }
-  board.add(right);
+  board.add(first);
+  board.add(flying);
   board.add(wrong);
 }
 

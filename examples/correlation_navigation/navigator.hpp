@@ -37,7 +37,7 @@ struct NavigatorOptions {
   double sigma_until_lost = 90;           ///< of the position, where Gauss-Newton steps no longer reach [m]
   double smallest_radius = 400;           ///< of a search [m]
   double velocity_sigma_after_loss = 10;  ///< added to the belief [m/s]
-  double fix_sigma = 15;  ///< added to what a fix claims: its frame's heading and scale are not exact [m]
+  double widen_fix = 3;  ///< a fix's sigmas: its frame goes through the filter too, and must not count twice
 };
 
 /// State [x, y, v_x, v_y, L_x, L_y, psi]; see patch_model.hpp.
@@ -95,6 +95,9 @@ private:
   void search(std::span<const double> z, double heading, NavigatorStep& step) {
     cairn::SearchOptions options = options_.search;
     options.radius = std::max(options_.smallest_radius, 3.0 * sigma());
+    const cairn::Vector<7> s = belief_.covariance.diagonal().cwiseSqrt();
+    options.scale_sigma = std::max(s(4) / belief_.mean(4), s(5) / belief_.mean(5));
+    options.heading_sigma = s(6);
     const cairn::Fix fix = cairn::correlation_search(
         map_, shape_, z, cairn::PlanarPlacement{heading}.placement(belief_.mean), options);
     step.searched = true;
@@ -105,8 +108,7 @@ private:
     belief_.mean(1) = fix.placement.y;
     belief_.covariance.topRows<2>().setZero();
     belief_.covariance.leftCols<2>().setZero();
-    belief_.covariance.topLeftCorner<2, 2>() =
-        fix.covariance + options_.fix_sigma * options_.fix_sigma * cairn::Matrix<2>::Identity();
+    belief_.covariance.topLeftCorner<2, 2>() = options_.widen_fix * options_.widen_fix * fix.covariance;
     mode_ = Mode::tracking;
     refused_ = 0;
   }

@@ -7,17 +7,22 @@
 /// The map is sampled on a lattice with the sensor's own spacing and heading, which makes the patch a
 /// rectangle of it; at every shift p
 ///   c(p) = sum (f_p - mean f_p)(z - mean z) / (n s_f s_z)                                        (1)
-/// over the samples inside the map (correlation_surface.hpp). Gain and bias of the sensor cancel. A bank of
+/// (correlation_surface.hpp). Gain and bias of the sensor cancel. A bank of
 /// headings and scales is searched by keeping the best at each shift.
 ///
-/// Confidence. The share of the patch's variance that a place leaves unexplained is 1 - c^2; the contrast
-///   (1 - c_second^2) / (1 - c_best^2)                                                            (2)
-/// compares the best place with the best one elsewhere, an F ratio of residual variances. Smooth terrain
-/// resembles itself everywhere, so that a peak-to-sidelobe ratio (reported as well) says little. A place is
-/// accepted in one of two ways:
-///   - the contrast is large whatever the residuals look like; or
-///   - the residuals at the place are white, as a sensor's noise is and as the difference of two pieces of
-///     ground is not, and the samples together make the second place unlikely: (n / 2) log(contrast) nats.
+/// Fix. The best shift is refined by least squares on the map itself (correlation_refinement.hpp), which also
+/// gives the covariance.
+///
+/// Confidence. With white noise of unknown variance a shift p has the likelihood (1 - c(p)^2)^(-n/2), n the
+/// samples that are independent. The log odds of the best place are those of the shifts around it against all
+/// others together and against its being none of them:
+///   log sum_near L(p) - log(sum_far L(p) + number of shifts)                                    (2)
+/// That is a probability only where what is left of the frame at the place is white, as a sensor's noise is
+/// and the difference of two pieces of ground is not. A place is accepted in one of two ways:
+///   - the residuals are white, and the odds are large; or
+///   - whatever the residuals, the share of variance left unexplained, 1 - c^2, is far larger elsewhere
+///     (the contrast, an F ratio).
+/// Smooth terrain resembles itself everywhere: a peak-to-sidelobe ratio (reported as well) says little.
 #pragma once
 
 #include <algorithm>
@@ -28,6 +33,8 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/core/statistics.hpp>
+#include <cairn/field/correlation_refinement.hpp>
 #include <cairn/field/correlation_surface.hpp>
 #include <cairn/field/fft.hpp>
 #include <cairn/field/patch.hpp>
@@ -41,7 +48,8 @@ enum class FixVerdict {
   flat_patch,  ///< the patch has no variance (or numbers that are not finite): it could be anywhere
   flat_map,    ///< no place in the region has enough variance and enough samples inside the map
   weak,        ///< the best place does not resemble the patch
-  ambiguous,   ///< another place resembles it nearly as well
+  ambiguous,   ///< other places resemble it nearly as well
+  imprecise,   ///< the place is known along one direction and not along the other: a slope, a ridge
   at_rim,      ///< the best place lies on the rim of the region: the true one may lie outside
 };
 
@@ -49,12 +57,15 @@ struct SearchOptions {
   double radius = 1000;               ///< half side of the square region of shifts, > 0 [m]
   std::vector<double> headings{0.0};  ///< offsets added to the heading of the guess [rad]
   std::vector<double> scales{1.0};    ///< factors on both scales of the guess
+  double scale_sigma = 0;             ///< of the guess's scales, relative: refined together with the place
+  double heading_sigma = 0;           ///< of the guess's heading [rad]: the same
   double exclusion = 5;               ///< samples around the best peak that are the peak itself
   double smallest_share = 0.75;       ///< of the patch's samples that must lie inside the map
-  double weakest_peak = 0.4;          ///< smallest correlation to accept
-  double large_contrast = 3.0;        ///< of (2): accepted whatever the residuals
-  double smallest_gain = 20.0;  ///< (n / 2) log(contrast) to accept where the residuals are white [nats]
-  double white_below = 0.3;     ///< largest correlation of neighbouring residuals that counts as white
+  double weakest_peak = 0.2;          ///< smallest correlation to accept
+  double smallest_log_odds = 7;       ///< of (2), to accept where the residuals are white: a thousand to one
+  double white_below = 0.3;           ///< largest correlation of neighbouring residuals that counts as white
+  double large_contrast = 3.0;        ///< accepted whatever the residuals
+  double largest_sigma = 0.5;         ///< of a place that is accepted, along its worst direction [samples]
 };
 
 /// The best place for a patch, its figures of confidence, and whether to believe it.
@@ -63,12 +74,12 @@ struct Fix {
   PatchPlacement placement;                  ///< of the best place, refined below the spacing of the samples
   double peak = 0;                           ///< correlation there, -1..1
   double second = 0;                         ///< best correlation elsewhere
-  double contrast = 0;                       ///< (2)
-  double likelihood_gain = 0;                ///< (n / 2) log(contrast) [nats]
+  double contrast = 0;                       ///< (1 - second^2) / (1 - peak^2)
+  double log_odds = 0;                       ///< (2) [nats]
   double residual_correlation = 1;           ///< of neighbouring samples, at the place; 0 for white noise
   double peak_to_sidelobe = 0;               ///< (peak - mean elsewhere) / standard deviation elsewhere
   std::size_t heading = 0, scale = 0;        ///< index into the options' bank
-  Matrix<2> covariance = Matrix<2>::Zero();  ///< of (x, y) for noise that is white over the samples [m^2]
+  Matrix<2> covariance = Matrix<2>::Zero();  ///< of (x, y); zero where the place could not be refined [m^2]
 
   [[nodiscard]] bool accepted() const noexcept { return verdict == FixVerdict::accepted; }
 };
@@ -93,24 +104,31 @@ inline PatchPlacement turned(const PatchPlacement& p, double angle, double scale
           s * p.across_x + c * p.across_y};
 }
 
-/// Figures of confidence of the best place of a surface, which lies at (column, row).
-inline void judge(Fix& fix, const Plane& surface, int column, int row, double exclusion) {
-  double sum = 0, squares = 0, count = 0;
+/// Figures of confidence of the best place of a surface, which lies at (column, row); `samples` is n of (2).
+inline void judge(Fix& fix, const Plane& surface, int column, int row, double exclusion, double samples) {
+  const auto unexplained = [](double c) { return std::max(1.0 - std::max(c, 0.0) * c, 1e-12); };
+  const double best = unexplained(surface(column, row));
+  const double negligible = best * std::exp(80.0 / samples);  // beyond it a place has less than e^-40
+  RunningMoments elsewhere;
+  double near = 0, far = 0, places = 0;  // likelihoods relative to the best place's
   fix.second = -1.0;
   for (int r = 0; r < surface.rows; ++r)
     for (int c = 0; c < surface.columns; ++c) {
       const double v = surface(c, r);
-      if (v == nothing || std::hypot(c - column, r - row) <= exclusion) continue;
+      if (v == nothing) continue;
+      places += 1.0;
+      const bool is_near = std::hypot(c - column, r - row) <= exclusion;
+      const double left = unexplained(v);
+      if (left < negligible) (is_near ? near : far) += std::pow(best / left, 0.5 * samples);
+      if (is_near) continue;
       fix.second = std::max(fix.second, v);
-      sum += v;
-      squares += v * v;
-      count += 1.0;
+      elsewhere.add(v);
     }
-  const double mean = count > 0.0 ? sum / count : 0.0;
-  const double deviation = count > 1.0 ? std::sqrt(std::max(squares / count - mean * mean, 1e-12)) : 1.0;
-  fix.peak_to_sidelobe = (fix.peak - mean) / deviation;
-  const double elsewhere = std::max(fix.second, 0.0);
-  fix.contrast = (1.0 - elsewhere * elsewhere) / std::max(1.0 - fix.peak * fix.peak, 1e-12);
+  const double nowhere = places * std::pow(best, 0.5 * samples);
+  fix.log_odds = std::log(near / std::max(far + nowhere, 1e-300));  // (2)
+  const double deviation = elsewhere.count() > 1 ? std::max(elsewhere.standard_deviation(), 1e-6) : 1.0;
+  fix.peak_to_sidelobe = (fix.peak - elsewhere.mean()) / deviation;
+  fix.contrast = unexplained(fix.second) / unexplained(fix.peak);
 }
 
 template <FieldInterpolant Map>
@@ -139,73 +157,51 @@ BankPeak search_bank(const Map& map, const PatchShape& shape, const Plane& patch
   return best;
 }
 
-/// Moves the fix to the vertex of the paraboloid over the peak and gives it its covariance. False on the rim.
-inline bool refine(Fix& fix, const BankPeak& best, int reach_along, int reach_across, std::size_t samples) {
-  const bool interior = best.column > 0 && best.row > 0 && best.column + 1 < best.surface.columns &&
-                        best.row + 1 < best.surface.rows;
-  Vector<2> vertex = Vector<2>::Zero();
-  Matrix<2> hessian;
-  double height = best.peak;
-  const bool refined = interior && paraboloid(best.surface, best.column, best.row, vertex, height, hessian);
-  if (!refined) vertex.setZero();
-  fix.peak = refined ? std::clamp(std::max(height, best.peak), -1.0, 1.0) : best.peak;
+/// The shorter step of a placement.
+inline double sample_spacing(const PatchPlacement& p) noexcept {
+  return std::min(std::hypot(p.along_x, p.along_y), std::hypot(p.across_x, p.across_y));
+}
+
+/// Refines the place on the map itself, where it does not lie on the rim of the region and the frame tells.
+template <FieldInterpolant Map>
+void refine(Fix& fix, const Map& map, const PatchShape& shape, std::span<const double> z,
+            const BankPeak& best, int reach_along, int reach_across, bool interior,
+            const SearchOptions& options) {
   Matrix<2> steps;  // ground per column and per row of the surface
   steps << best.placement.along_x, -best.placement.across_x, best.placement.along_y, -best.placement.across_y;
-  const Vector<2> shift = steps * (Vector<2>(best.column - reach_along, best.row - reach_across) + vertex);
+  Vector<2> cell(best.column - reach_along, best.row - reach_across);
+  if (interior) cell += paraboloid_vertex(best.surface, best.column, best.row);
+  const Vector<2> shift = steps * cell;
   fix.placement = best.placement;
   fix.placement.x += shift(0);
   fix.placement.y += shift(1);
-  if (!refined) return false;
-  // Information of a shift: -n c c'' / (1 - c^2), from the curvature of the sum of squared residuals.
-  const double unexplained = std::max(1.0 - fix.peak * fix.peak, 1e-12);
-  const Matrix<2> information = -(static_cast<double>(samples) * fix.peak / unexplained) * hessian;
-  fix.covariance = symmetrised(steps * information.llt().solve(Matrix<2>(steps.transpose())));
-  return true;
+  if (!interior) return;
+  const auto refined = refined_placement(map, shape, z, fix.placement, options.scale_sigma,
+                                         options.heading_sigma, options.smallest_share);
+  if (!refined) return;
+  const double moved =
+      std::hypot(refined->placement.x - fix.placement.x, refined->placement.y - fix.placement.y);
+  if (!(moved <= options.exclusion * sample_spacing(fix.placement))) return;
+  fix.placement = refined->placement;
+  fix.covariance = refined->covariance;
 }
 
-/// Correlation of neighbouring residuals z - (gain f + bias) with gain and bias fitted at the placement; 1
-/// when there is nothing to fit or no residual.
-template <FieldInterpolant Map>
-double neighbour_correlation(const Map& map, const PatchShape& shape, std::span<const double> z,
-                             const PatchPlacement& at) {
-  PatchSamples f;
-  sample_patch(map, shape, at, f);
-  double n = 0, sf = 0, sz = 0, sff = 0, sfz = 0;
-  for (std::size_t i = 0; i < z.size(); ++i) {
-    if (f.inside[i] == 0) continue;
-    n += 1.0;
-    sf += f.value[i];
-    sz += z[i];
-  }
-  for (std::size_t i = 0; i < z.size(); ++i) {
-    if (f.inside[i] == 0) continue;
-    sff += (f.value[i] - sf / n) * (f.value[i] - sf / n);
-    sfz += (f.value[i] - sf / n) * (z[i] - sz / n);
-  }
-  if (!(sff > 0.0)) return 1.0;
-  const auto residual = [&](std::size_t i) { return z[i] - sz / n - sfz / sff * (f.value[i] - sf / n); };
-  const auto width = static_cast<std::size_t>(shape.along());
-  double products = 0, squares = 0, pairs = 0;
-  for (std::size_t i = 0; i < z.size(); ++i) {
-    if (f.inside[i] == 0) continue;
-    const double r = residual(i);
-    squares += r * r;
-    for (const std::size_t j : {i + 1, i + width})
-      if (j < z.size() && f.inside[j] != 0 && (j != i + 1 || j % width != 0)) {
-        products += r * residual(j);
-        pairs += 1.0;
-      }
-  }
-  return squares > 0.0 && pairs > 0.0 ? products / pairs / (squares / n) : 1.0;
+/// The larger standard deviation of a place, in samples.
+inline double worst_sigma(const Fix& fix) {
+  const Matrix<2>& c = fix.covariance;
+  const double largest = 0.5 * c.trace() + std::hypot(0.5 * (c(0, 0) - c(1, 1)), c(0, 1));
+  return std::sqrt(largest) / sample_spacing(fix.placement);
 }
 
-inline FixVerdict verdict_of(const Fix& fix, bool refined, const SearchOptions& options) noexcept {
+inline FixVerdict verdict_of(const Fix& fix, bool interior, const SearchOptions& options) {
   if (fix.peak < options.weakest_peak) return FixVerdict::weak;
-  if (!refined) return FixVerdict::at_rim;
+  if (!interior) return FixVerdict::at_rim;
   const bool white = std::abs(fix.residual_correlation) < options.white_below;
   const bool certain =
-      fix.contrast >= options.large_contrast || (white && fix.likelihood_gain >= options.smallest_gain);
-  return certain ? FixVerdict::accepted : FixVerdict::ambiguous;
+      fix.contrast >= options.large_contrast || (white && fix.log_odds >= options.smallest_log_odds);
+  if (!certain) return FixVerdict::ambiguous;
+  const bool known = fix.covariance(0, 0) > 0.0 && worst_sigma(fix) <= options.largest_sigma;
+  return known ? FixVerdict::accepted : FixVerdict::imprecise;
 }
 
 }  // namespace detail
@@ -234,11 +230,16 @@ template <FieldInterpolant Map>
   const int along = reach(guess.along_x, guess.along_y), across = reach(guess.across_x, guess.across_y);
   const detail::BankPeak best = detail::search_bank(map, shape, patch, guess, options, along, across, fix);
   if (best.peak == detail::nothing) return fix;  // flat_map
-  const bool refined = detail::refine(fix, best, along, across, z.size());
-  detail::judge(fix, best.all, best.column, best.row, options.exclusion);
-  fix.likelihood_gain = 0.5 * static_cast<double>(z.size()) * std::log(fix.contrast);
-  fix.residual_correlation = detail::neighbour_correlation(map, shape, z, fix.placement);
-  fix.verdict = detail::verdict_of(fix, refined, options);
+  const bool interior = best.column > 0 && best.row > 0 && best.column + 1 < best.surface.columns &&
+                        best.row + 1 < best.surface.rows;
+  detail::refine(fix, map, shape, z, best, along, across, interior, options);
+  const detail::PatchAgreement agreement = detail::patch_agreement(map, shape, z, fix.placement);
+  fix.peak = std::max(agreement.correlation, best.peak);
+  fix.residual_correlation = agreement.residual_correlation;
+  fix.covariance /= agreement.independent_share;
+  detail::judge(fix, best.all, best.column, best.row, options.exclusion,
+                agreement.independent_share * static_cast<double>(z.size()));
+  fix.verdict = detail::verdict_of(fix, interior, options);
   return fix;
 }
 

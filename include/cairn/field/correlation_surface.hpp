@@ -6,10 +6,11 @@
 /// correlation.hpp looks for peaks in.
 ///
 ///   c(p) = sum (f_p - mean f_p)(z - mean z) / (n s_f s_z)
-/// over the n samples inside the map. The sums over f alone are differences of running sums, those with z are
-/// sliding products by FFT (J. P. Lewis, "Fast normalized cross-correlation", 1995); where the map has voids
-/// or ends, the sums over z alone depend on the shift as well (D. Padfield, "Masked object registration in
-/// the Fourier domain", IEEE T-IP 21(5), 2012).
+/// summed over the samples inside the map, with n s_z^2 the energy of the whole patch: samples that the map
+/// does not know count as unexplained, so that a place with fewer of them is not favoured. The sums over f
+/// alone are differences of running sums, those with z are sliding products by FFT (J. P. Lewis, "Fast
+/// normalized cross-correlation", 1995); where the map has voids or ends, the mean of z depends on the shift
+/// as well (D. Padfield, "Masked object registration in the Fourier domain", IEEE T-IP 21(5), 2012).
 #pragma once
 
 #include <algorithm>
@@ -80,19 +81,15 @@ inline constexpr double nothing = -2.0;
 
 inline Plane correlation_surface(const MapWindow& window, const Plane& patch, double smallest_share) {
   const int w = patch.columns, h = patch.rows;
-  Plane squares = window.value, patch_squares = patch;
+  Plane squares = window.value;
   for (double& v : squares.values) v *= v;
-  for (double& v : patch_squares.values) v *= v;
   const double whole = static_cast<double>(patch.values.size());
   double patch_energy = 0;
-  for (const double v : patch_squares.values) patch_energy += v;
+  for (const double v : patch.values) patch_energy += v * v;
   const Plane cross = sliding_products(window.value, patch);
   const BoxSums values(window.value), energy(squares), known(window.known);
-  Plane patch_sum, patch_square_sum;
-  if (!window.complete) {
-    patch_sum = sliding_products(window.known, patch);
-    patch_square_sum = sliding_products(window.known, patch_squares);
-  }
+  Plane patch_sum;
+  if (!window.complete) patch_sum = sliding_products(window.known, patch);
   const double flat = 1e-12 * energy(0, 0, window.value.columns, window.value.rows) /
                       static_cast<double>(window.value.values.size());
   Plane surface(cross.columns, cross.rows, nothing);
@@ -101,11 +98,10 @@ inline Plane correlation_surface(const MapWindow& window, const Plane& patch, do
       const double n = window.complete ? whole : std::round(known(c, r, w, h));
       if (n < std::max(2.0, smallest_share * whole)) continue;
       const double sz = window.complete ? 0.0 : patch_sum(c, r);
-      const double szz = window.complete ? patch_energy : patch_square_sum(c, r);
       const double sf = values(c, r, w, h);
-      const double variance_f = energy(c, r, w, h) - sf * sf / n, variance_z = szz - sz * sz / n;
-      if (!(variance_f > flat * n) || !(variance_z > 1e-9 * patch_energy)) continue;
-      surface(c, r) = std::clamp((cross(c, r) - sf * sz / n) / std::sqrt(variance_f * variance_z), -1.0, 1.0);
+      const double energy_f = energy(c, r, w, h) - sf * sf / n;
+      if (!(energy_f > flat * n)) continue;
+      surface(c, r) = std::clamp((cross(c, r) - sf * sz / n) / std::sqrt(energy_f * patch_energy), -1.0, 1.0);
     }
   return surface;
 }
@@ -123,35 +119,28 @@ inline Plane centred_patch(const PatchShape& shape, std::span<const double> z) {
   return deviations > 1e-20 * squares ? patch : Plane();
 }
 
-/// Vertex and Hessian of the paraboloid through the 3 x 3 values around (c, r), by least squares; the vertex
-/// stays within one sample. False when it has no maximum.
-inline bool paraboloid(const Plane& s, int c, int r, Vector<2>& vertex, double& height, Matrix<2>& hessian) {
-  double f[3][3];
+/// Vertex of the paraboloid through the 3 x 3 values around (c, r), by least squares; zero where it has no
+/// maximum within a sample. A place to start from: three values do not know the shape of a peak, and the
+/// vertex errs by a twentieth of a sample however good the data are.
+inline Vector<2> paraboloid_vertex(const Plane& s, int c, int r) {
+  double sx = 0, sy = 0, sxx = 0, syy = 0, sxy = 0, sum = 0;
   for (int j = -1; j <= 1; ++j)
     for (int i = -1; i <= 1; ++i) {
-      f[j + 1][i + 1] = s(c + i, r + j);
-      if (f[j + 1][i + 1] == nothing) return false;
+      const double f = s(c + i, r + j);
+      if (f == nothing) return Vector<2>::Zero();
+      sx += i * f;
+      sy += j * f;
+      sxx += i * i * f;
+      syy += j * j * f;
+      sxy += i * j * f;
+      sum += f;
     }
-  double sx = 0, sy = 0, sxx = 0, syy = 0, sum = 0;
-  for (int j = 0; j < 3; ++j)
-    for (int i = 0; i < 3; ++i) {
-      sx += (i - 1) * f[j][i];
-      sy += (j - 1) * f[j][i];
-      sxx += (i - 1) * (i - 1) * f[j][i];
-      syy += (j - 1) * (j - 1) * f[j][i];
-      sum += f[j][i];
-    }
-  const double cross = 0.25 * (f[2][2] + f[0][0] - f[0][2] - f[2][0]);
-  const Vector<2> slope(sx / 6.0, sy / 6.0);
-  hessian << sxx - 2.0 / 3.0 * sum, cross, cross, syy - 2.0 / 3.0 * sum;
-  const double determinant = hessian(0, 0) * hessian(1, 1) - cross * cross;
-  if (!(hessian(0, 0) < 0.0 && determinant > 0.0)) return false;
-  vertex << -(hessian(1, 1) * slope(0) - cross * slope(1)) / determinant,
-      -(hessian(0, 0) * slope(1) - cross * slope(0)) / determinant;
-  vertex = vertex.cwiseMax(-1.0).cwiseMin(1.0);
-  const double centre = (5.0 * sum - 3.0 * (sxx + syy)) / 9.0;
-  height = centre + 0.5 * slope.dot(vertex);
-  return true;
+  const double cross = 0.25 * sxy, xx = sxx - 2.0 / 3.0 * sum, yy = syy - 2.0 / 3.0 * sum;
+  const double determinant = xx * yy - cross * cross;
+  if (!(xx < 0.0 && determinant > 0.0)) return Vector<2>::Zero();
+  const Vector<2> vertex{-(yy * sx - cross * sy) / (6.0 * determinant),
+                         -(xx * sy - cross * sx) / (6.0 * determinant)};
+  return vertex.cwiseAbs().maxCoeff() <= 1.0 ? vertex : Vector<2>::Zero();
 }
 
 }  // namespace detail

@@ -26,7 +26,10 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
-#include <cairn/field/patch_filter.hpp>
+#include <cairn/field/patch.hpp>
+#include <cairn/field/patch_gram.hpp>
+#include <cairn/field/patch_model.hpp>
+#include <cairn/field/patch_noise.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kalman_bucy.hpp>
 #include <cairn/filter/model.hpp>
@@ -82,9 +85,37 @@ int dormand_prince(Vec& y, double t, double end, double tolerance, int most_step
   return 0;
 }
 
-}  // namespace detail
+/// Mean and information matrix as one vector, which is what is integrated.
+template <int N>
+using PackedBelief = Vector<N + N * N>;
 
-namespace detail {
+template <int N>
+bool pack_belief(const Gaussian<Vector<N>>& belief, PackedBelief<N>& y) {
+  const Eigen::LLT<Matrix<N>> prior(belief.covariance);
+  if (prior.info() != Eigen::Success) return false;
+  y << belief.mean, prior.solve(Matrix<N>::Identity()).reshaped();
+  return true;
+}
+
+/// False, and the belief as it was, when the information is not positive definite.
+template <int N>
+bool unpack_belief(const PackedBelief<N>& y, Gaussian<Vector<N>>& belief) {
+  const Matrix<N> sigma = symmetrised(y.template tail<N * N>().reshaped(N, N));
+  const Eigen::LLT<Matrix<N>> posterior(sigma);
+  if (posterior.info() != Eigen::Success) return false;
+  belief.mean = y.template head<N>();
+  belief.covariance = symmetrised(posterior.solve(Matrix<N>::Identity()));
+  return true;
+}
+
+/// What errors of y are compared with: sigmas, and products of the information's diagonal.
+template <int N>
+PackedBelief<N> error_scales(const PackedBelief<N>& y) {
+  const Vector<N> root = y.template tail<N * N>().reshaped(N, N).diagonal().cwiseSqrt();
+  PackedBelief<N> result;
+  result << root.cwiseInverse(), (root * root.transpose()).reshaped();
+  return result;
+}
 
 /// A process in which nothing moves.
 template <class X>
@@ -132,13 +163,10 @@ PatchVerdict PatchBucy::integrate(Gaussian<typename Placement::State>& belief, c
                                   double t, double end, PatchScratch& scratch) const {
   constexpr int N = Placement::State::RowsAtCompileTime;
   CAIRN_EXPECTS(density > 0.0 && end >= t, "the Kalman-Bucy filter needs a density above 0 and end >= start");
-  using Packed = Vector<N + N * N>;
+  using Packed = detail::PackedBelief<N>;
   if (!(end > t)) return PatchVerdict::accepted;
-  const Eigen::LLT<Matrix<N>> prior(belief.covariance);
-  if (prior.info() != Eigen::Success) return PatchVerdict::not_positive_definite;
   Packed y;
-  y << belief.mean, prior.solve(Matrix<N>::Identity()).reshaped();
-  const PatchFilter linearise{};
+  if (!detail::pack_belief(belief, y)) return PatchVerdict::not_positive_definite;
   const PatchNoise noise(density);
   PatchVerdict verdict = PatchVerdict::accepted;
   const auto slope = [&](double time, const Packed& at, Packed& result) {
@@ -148,7 +176,8 @@ PatchVerdict PatchBucy::integrate(Gaussian<typename Placement::State>& belief, c
     PatchGram frame;
     verdict = !at.allFinite() || factor.info() != Eigen::Success
                   ? PatchVerdict::not_positive_definite
-                  : linearise.gram(map, shape, where.placement(x), frame_at(time), noise, scratch, frame);
+                  : PatchLinearisation{}.gram(map, shape, where.placement(x), frame_at(time), noise, scratch,
+                                              frame);
     if (verdict == PatchVerdict::accepted && !frame.gradient.allFinite()) verdict = PatchVerdict::not_finite;
     if (verdict != PatchVerdict::accepted) return false;
     const auto J = where.jacobian(x);
@@ -160,21 +189,11 @@ PatchVerdict PatchBucy::integrate(Gaussian<typename Placement::State>& belief, c
     result.template tail<N * N>() = rate.reshaped();
     return true;
   };
-  const auto scales = [](const Packed& at) {
-    const Matrix<N> sigma = at.template tail<N * N>().reshaped(N, N);
-    const Vector<N> root = sigma.diagonal().cwiseSqrt();
-    Packed result;
-    result << root.cwiseInverse(), (root * root.transpose()).reshaped();
-    return result;
-  };
-  if (detail::dormand_prince(y, t, end, tolerance, most_steps, slope, scales) == 0)
-    return verdict == PatchVerdict::accepted ? PatchVerdict::not_positive_definite : verdict;
-  const Matrix<N> sigma = symmetrised(y.template tail<N * N>().reshaped(N, N));
-  const Eigen::LLT<Matrix<N>> posterior(sigma);
-  if (posterior.info() != Eigen::Success) return PatchVerdict::not_positive_definite;
-  belief.mean = y.template head<N>();
-  belief.covariance = symmetrised(posterior.solve(Matrix<N>::Identity()));
-  return PatchVerdict::accepted;
+  const bool arrived =
+      detail::dormand_prince(y, t, end, tolerance, most_steps, slope, detail::error_scales<N>) != 0;
+  if (!arrived && verdict != PatchVerdict::accepted) return verdict;
+  return arrived && detail::unpack_belief(y, belief) ? PatchVerdict::accepted
+                                                     : PatchVerdict::not_positive_definite;
 }
 
 }  // namespace cairn::inline CAIRN_ABI

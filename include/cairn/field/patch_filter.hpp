@@ -10,12 +10,9 @@
 ///   (I + L^T A L) u' = L^T (g + A L u),   A = H^T C^-1 H,   g = H^T C^-1 (z - h)             (1)
 ///   P' = L (I + L^T A L)^-1 L^T                                                              (2)
 /// P is never inverted, and a frame without information (A = 0) leaves it as it was. A thousand samples cost
-/// one Gram matrix of nine columns: the six of patch_model.hpp, one for a bias, h itself for a gain, z - h.
-/// An unknown gain and bias, z = g h + d + noise with no prior, are eliminated from it exactly; H is then g
-/// times the map's slope, with g as fitted at the point of linearisation.
+/// one Gram matrix of nine columns (patch_gram.hpp), from which an unknown gain and bias are eliminated.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -25,22 +22,13 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/field/patch.hpp>
+#include <cairn/field/patch_gram.hpp>
 #include <cairn/field/patch_model.hpp>
 #include <cairn/field/patch_noise.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn::inline CAIRN_ABI {
-
-/// What became of a frame. Only `accepted` changes the belief.
-enum class [[nodiscard]] PatchVerdict {
-  accepted,
-  flat,                   ///< the map has no slope under the frame, or no contrast to tell gain from bias
-  outside,                ///< too few samples lie inside the map
-  gated,                  ///< the residuals that are left are larger than the noise allows
-  not_finite,             ///< NaN or infinity in the frame or the belief
-  not_positive_definite,  ///< the belief's covariance
-};
 
 /// What a frame brought.
 struct PatchUpdate {
@@ -51,21 +39,6 @@ struct PatchUpdate {
   double gain = 1;          ///< of the sensor, where free_gain
   double information = 0;   ///< trace of L^T A L: how much the frame says beside the prior
   [[nodiscard]] bool accepted() const noexcept { return verdict == PatchVerdict::accepted; }
-};
-
-/// Memory that updates reuse. One per thread.
-struct PatchScratch {
-  PatchSamples samples;
-  Matrix<dynamic, 9> columns;
-};
-
-/// A frame linearised at a placement, gain and bias eliminated where asked for.
-struct PatchGram {
-  Matrix<6> information;  ///< of the placement's six numbers
-  Vector<6> gradient;     ///< W^T C^-1 (z - h)
-  double squares = 0;     ///< (z - h)^T C^-1 (z - h)
-  double gain = 1;        ///< fitted where free_gain, otherwise 1
-  std::size_t samples = 0;
 };
 
 /// Options of the correction; holds no state.
@@ -79,12 +52,10 @@ struct PatchFilter {
   double gate = std::numeric_limits<double>::infinity();  ///< of PatchUpdate::residual
   double smallest_information = 1e-9;                     ///< of PatchUpdate::information, below it: flat
 
-  /// The frame's Gram matrix at a placement, or why there is none: outside or flat. z may be empty when only
-  /// the information is wanted (the gradient is then that of a perfect frame: zero).
-  template <FieldInterpolant Map>
-  PatchVerdict gram(const Map& map, const PatchShape& shape, const PatchPlacement& at,
-                    std::span<const double> z, const PatchNoise& noise, PatchScratch& scratch,
-                    PatchGram& result) const;
+  /// How the frames are linearised.
+  [[nodiscard]] PatchLinearisation linearisation() const noexcept {
+    return {free_bias, free_gain, smallest_share};
+  }
 
   /// Corrects the belief with frame z (shape.size() numbers), or leaves it as it was.
   template <FramePlacement Placement, FieldInterpolant Map>
@@ -98,80 +69,25 @@ struct PatchFilter {
       const typename Placement::State& x, const Placement& where, const Map& map, const PatchShape& shape,
       const PatchNoise& noise, PatchScratch& scratch) const {
     PatchGram result;
-    if (gram(map, shape, where.placement(x), {}, noise, scratch, result) != PatchVerdict::accepted)
+    if (linearisation().gram(map, shape, where.placement(x), {}, noise, scratch, result) !=
+        PatchVerdict::accepted)
       return std::nullopt;
     const auto J = where.jacobian(x);
     return (J.transpose() * result.information * J).eval();
   }
+
+private:
+  /// Gauss-Newton over u, x = mean + L u: the minimum, the information A there and what the frame brought.
+  template <FramePlacement Placement, int n, class Linearise>
+  void minimise(const typename Placement::State& mean, const Matrix<n>& L, const Placement& where,
+                const Linearise& linearise, Vector<n>& u, Matrix<n>& A, PatchUpdate& result) const;
 };
-
-namespace detail {
-
-/// Eliminates row and column k of a Gram matrix. False when what is left of its diagonal is rounding.
-inline bool eliminate(Matrix<9>& gram, int k, double original_diagonal) {
-  if (!(gram(k, k) > 1e-12 * original_diagonal)) return false;
-  const Vector<9> column = gram.col(k) / std::sqrt(gram(k, k));
-  gram -= column * column.transpose();
-  return true;
-}
-
-}  // namespace detail
-
-template <FieldInterpolant Map>
-PatchVerdict PatchFilter::gram(const Map& map, const PatchShape& shape, const PatchPlacement& at,
-                               std::span<const double> z, const PatchNoise& noise, PatchScratch& scratch,
-                               PatchGram& result) const {
-  PatchSamples& f = scratch.samples;
-  sample_patch(map, shape, at, f);
-  result.samples = f.count_inside;
-  if (static_cast<double>(f.count_inside) < std::max(1.0, smallest_share * static_cast<double>(shape.size())))
-    return PatchVerdict::outside;
-  double mean = 0;  // of h: subtracted from the gain's column, which leaves the span of both as it is
-  for (const double value : f.value) mean += value;
-  mean /= static_cast<double>(f.count_inside);
-  double contrast = 0;
-  for (std::size_t k = 0; k < shape.size(); ++k) contrast += f.inside[k] * std::pow(f.value[k] - mean, 2);
-  constexpr double rounding = 1e-11;  // of an interpolated value, relative: with room for its sums
-  if (free_gain && !(contrast > std::pow(rounding * mean, 2) * static_cast<double>(f.count_inside)))
-    return PatchVerdict::flat;
-  scratch.columns.resize(static_cast<Eigen::Index>(shape.size()), 9);
-  std::size_t i = 0;
-  for (int b = shape.half_width; b >= -shape.half_width; --b)
-    for (int a = -shape.behind; a <= shape.ahead; ++a, ++i) {
-      double* row = scratch.columns.data() + i;
-      const std::size_t stride = shape.size();
-      const double inside = f.inside[i];
-      row[0] = f.dx[i];
-      row[stride] = f.dy[i];
-      row[2 * stride] = a * f.dx[i];
-      row[3 * stride] = a * f.dy[i];
-      row[4 * stride] = b * f.dx[i];
-      row[5 * stride] = b * f.dy[i];
-      row[6 * stride] = inside;
-      row[7 * stride] = inside * (f.value[i] - mean);
-      row[8 * stride] = z.empty() ? 0.0 : inside * (z[i] - f.value[i]);
-    }
-  Matrix<9> all = noise.weigh<9>(scratch.columns, f.count_inside == shape.size());
-  const double value_diagonal = all(7, 7);
-  result.gain = 1.0;
-  if ((free_bias || free_gain) && !detail::eliminate(all, 6, all(6, 6))) return PatchVerdict::flat;
-  if (free_gain) {
-    const double excess = all(7, 8) / all(7, 7);
-    if (!detail::eliminate(all, 7, value_diagonal)) return PatchVerdict::flat;
-    result.gain = 1.0 + excess;
-  }
-  result.information = (result.gain * result.gain) * all.topLeftCorner<6, 6>();
-  result.gradient = result.gain * all.topRightCorner<6, 1>();
-  result.squares = all(8, 8);
-  return PatchVerdict::accepted;
-}
 
 template <FramePlacement Placement, FieldInterpolant Map>
 PatchUpdate PatchFilter::update(Gaussian<typename Placement::State>& belief, const Placement& where,
                                 const Map& map, const PatchShape& shape, std::span<const double> z,
                                 const PatchNoise& noise, PatchScratch& scratch) const {
-  using State = typename Placement::State;
-  constexpr int n = State::RowsAtCompileTime;
+  constexpr int n = Placement::State::RowsAtCompileTime;
   CAIRN_EXPECTS(z.size() == shape.size(), "PatchFilter::update needs one number a sample of the frame");
   CAIRN_EXPECTS(iterations >= 1, "PatchFilter needs at least one linearisation");
   PatchUpdate result;
@@ -183,34 +99,13 @@ PatchUpdate PatchFilter::update(Gaussian<typename Placement::State>& belief, con
   result.verdict = PatchVerdict::not_positive_definite;
   if (root.info() != Eigen::Success) return result;
   const Matrix<n> L = root.matrixL();
-
-  Vector<n> u = Vector<n>::Zero(), best_u = u;  // x = m + L u: where to look, and the least cost so far
-  Matrix<n> A = Matrix<n>::Zero();
-  double least = std::numeric_limits<double>::infinity();
-  PatchGram frame;
-  for (bool done = false; !done && result.iterations < iterations;) {
-    const State x = belief.mean + L * u;
-    const PatchVerdict seen = gram(map, shape, where.placement(x), z, noise, scratch, frame);
-    ++result.iterations;
-    if (result.iterations > 1 && !(seen == PatchVerdict::accepted &&
-                                   u.squaredNorm() + frame.squares < least)) {  // too far: half way back
-      u = 0.5 * (u + best_u);
-      continue;
-    }
-    result.verdict = seen;
-    if (!result.accepted()) return result;
-    least = u.squaredNorm() + frame.squares;
-    best_u = u;
-    const auto J = (where.jacobian(x) * L).eval();
-    A = J.transpose() * frame.information * J;
-    result.samples = frame.samples;
-    result.residual = frame.squares / static_cast<double>(frame.samples);
-    result.gain = frame.gain;
-    const Matrix<n> M = Matrix<n>::Identity() + A;
-    u = M.llt().solve(J.transpose() * frame.gradient + A * best_u);  // (1)
-    const Vector<n> step = u - best_u;
-    done = step.dot(M * step) < tolerance * tolerance;
-  }
+  Vector<n> u;
+  Matrix<n> A;
+  const auto linearise = [&](const typename Placement::State& x, PatchGram& frame) {
+    return linearisation().gram(map, shape, where.placement(x), z, noise, scratch, frame);
+  };
+  minimise(belief.mean, L, where, linearise, u, A, result);
+  if (!result.accepted()) return result;
   result.information = A.trace();
   if (!(result.information > smallest_information))
     result.verdict = PatchVerdict::flat;
@@ -221,6 +116,38 @@ PatchUpdate PatchFilter::update(Gaussian<typename Placement::State>& belief, con
   belief.mean += L * u;
   belief.covariance = symmetrised(L * M.llt().solve(Matrix<n>(L.transpose())));  // (2)
   return result;
+}
+
+template <FramePlacement Placement, int n, class Linearise>
+void PatchFilter::minimise(const typename Placement::State& mean, const Matrix<n>& L, const Placement& where,
+                           const Linearise& linearise, Vector<n>& u, Matrix<n>& A,
+                           PatchUpdate& result) const {
+  Vector<n> best = u = Vector<n>::Zero();  // x = m + L u: where to look next, and the least cost so far
+  double least = std::numeric_limits<double>::infinity();
+  PatchGram frame;
+  for (bool done = false; !done && result.iterations < iterations;) {
+    const typename Placement::State x = mean + L * u;
+    const PatchVerdict seen = linearise(x, frame);
+    ++result.iterations;
+    const double cost = u.squaredNorm() + frame.squares;
+    if (result.iterations > 1 && !(seen == PatchVerdict::accepted && cost < least)) {
+      u = 0.5 * (u + best);  // too far: half way back
+      continue;
+    }
+    result.verdict = seen;
+    if (!result.accepted()) return;
+    least = cost;
+    best = u;
+    const auto J = (where.jacobian(x) * L).eval();
+    A = J.transpose() * frame.information * J;
+    result.samples = frame.samples;
+    result.residual = frame.squares / static_cast<double>(frame.samples);
+    result.gain = frame.gain;
+    const Matrix<n> M = Matrix<n>::Identity() + A;
+    u = M.llt().solve(J.transpose() * frame.gradient + A * best);  // (1)
+    const Vector<n> step = u - best;
+    done = step.dot(M * step) < tolerance * tolerance;
+  }
 }
 
 }  // namespace cairn::inline CAIRN_ABI
