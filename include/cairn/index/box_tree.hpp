@@ -29,6 +29,7 @@ class BoxTree {
 public:
   using Real = RealOf<Scalar>;
   using Bits = BitsOf<Real>;
+  static constexpr unsigned max_levels = 8;  // 16^8 leaves of 16 points are more than 2^32
 
   BoxTree() = default;
 
@@ -57,41 +58,81 @@ public:
 
   [[nodiscard]] std::size_t bytes() const noexcept { return boxes_.capacity() * sizeof(Real); }
 
-  /// Offers all points nearer than the collector's limit, nearest boxes first. `dim` is the tree's, given
-  /// again so that it may be a constant.
+  /// How far a search has come: the children that wait at every level of its path, as keys, and the nearest
+  /// of the last level, whose memory has been asked for.
+  struct Walk {
+    Block<Bits> waiting[max_levels];
+    std::size_t node_of[max_levels];
+    unsigned level;
+    Bits next;
+  };
+
+  /// Levels of nodes above the leaves.
+  [[nodiscard]] unsigned levels() const noexcept { return levels_; }
+
+  /// Begins a search. `dim` is the tree's, given again so that it may be a constant.
+  template <class M, class C>
+  [[gnu::always_inline]] void enter(Walk& walk, const Real* query, std::size_t dim, const M& metric,
+                                    const C& collector, Work& work) const {
+    walk.level = 0;
+    walk.node_of[0] = 0;
+    if (levels_ > 0) {
+      bound_children(0, 0, query, dim, metric, collector, walk.waiting[0], work);
+      walk.next = smallest<Bits>(walk.waiting[0]);
+    } else {
+      walk.waiting[0] = Block<Bits>{} + none;
+      walk.next = layout_.leaves() > 0 ? Bits{0} : none;
+    }
+  }
+
+  /// Visits the node or leaf that is next, if it may hold something near enough; false where none does. What
+  /// comes after it is asked for from memory: a leaf before this one is scanned, a node to be visited later.
+  template <class M, class C>
+  [[gnu::always_inline]] bool advance(Walk& walk, const LeafBlocks<Scalar>& blocks, const Real* query,
+                                      std::size_t dim, const M& metric, C& collector, Work& work) const {
+    while (!(bound_of(walk.next) < static_cast<Real>(collector.limit()))) {
+      if (walk.level == 0) return false;
+      walk.next = smallest<Bits>(walk.waiting[--walk.level]);
+    }
+    const auto lane = static_cast<std::size_t>(walk.next & 15);
+    walk.waiting[walk.level][lane] = none;
+    const std::size_t child = child_at(walk, lane);
+    if (walk.level + 1 >= levels_) {
+      walk.next = smallest<Bits>(walk.waiting[walk.level]);
+      if (bound_of(walk.next) < static_cast<Real>(collector.limit()))
+        blocks.prefetch(leaf_of(child_at(walk, static_cast<std::size_t>(walk.next & 15))), dim);
+      scan(blocks, leaf_of(child), query, dim, metric, collector, work);
+      return true;
+    }
+    walk.node_of[++walk.level] = child;
+    bound_children(walk.level, child, query, dim, metric, collector, walk.waiting[walk.level], work);
+    walk.next = smallest<Bits>(walk.waiting[walk.level]);
+    return true;
+  }
+
+  /// Asks for the memory of what is next.
+  [[gnu::always_inline]] void prefetch(const Walk& walk, const LeafBlocks<Scalar>& blocks,
+                                       std::size_t dim) const noexcept {
+    if (walk.next == none) return;
+    const std::size_t child = child_at(walk, static_cast<std::size_t>(walk.next & 15));
+    if (walk.level + 1 >= levels_) return blocks.prefetch(leaf_of(child), dim);
+    const auto* bytes = reinterpret_cast<const char*>(boxes_.data() + (first_node_[walk.level + 1] + child) *
+                                                                          (2 * dim * block_size));
+    for (std::size_t at = 0; at < 2 * dim * block_size * sizeof(Real); at += 64)
+      __builtin_prefetch(bytes + at);
+  }
+
+  /// Offers all points nearer than the collector's limit, nearest boxes first.
   template <class M, class C>
   [[gnu::always_inline]] void search(const LeafBlocks<Scalar>& blocks, const Real* query, std::size_t dim,
                                      const M& metric, C& collector, Work& work) const {
-    if (levels_ == 0) {
-      if (layout_.leaves() > 0) scan(blocks, 0, query, dim, metric, collector, work);
-      return;
-    }
-    Block<Bits> waiting[max_levels];
-    std::size_t node_of[max_levels];
-    unsigned level = 0;
-    node_of[0] = 0;
-    bound_children(0, 0, query, dim, metric, collector, waiting[0], work);
-    for (;;) {
-      const Bits best = smallest<Bits>(waiting[level]);
-      if (!(bound_of(best) < static_cast<Real>(collector.limit()))) {
-        if (level == 0) return;
-        --level;
-        continue;
-      }
-      const auto lane = static_cast<std::size_t>(best & 15);
-      waiting[level][lane] = none;
-      const std::size_t child = (node_of[level] << fan_bits(level)) + lane;
-      if (level + 1 == levels_) {
-        scan(blocks, (child * layout_.leaves()) >> layout_.depth(), query, dim, metric, collector, work);
-      } else {
-        node_of[++level] = child;
-        bound_children(level, child, query, dim, metric, collector, waiting[level], work);
-      }
+    Walk walk;
+    enter(walk, query, dim, metric, collector, work);
+    while (advance(walk, blocks, query, dim, metric, collector, work)) {
     }
   }
 
 private:
-  static constexpr unsigned max_levels = 8;  // 16^8 leaves of 16 points are more than 2^32
   static constexpr Bits none = std::numeric_limits<Bits>::max();
 
   [[nodiscard]] std::size_t node_size() const noexcept { return 2 * dim_ * block_size; }
@@ -109,6 +150,14 @@ private:
   }
   [[nodiscard]] const Real* box(unsigned level, std::size_t node) const noexcept {
     return boxes_.data() + (first_node_[level] + node) * (2 * dim_ * block_size);
+  }
+
+  /// Number, within its level, of the child in a lane of the node where a search stands.
+  [[gnu::always_inline]] std::size_t child_at(const Walk& walk, std::size_t lane) const noexcept {
+    return (walk.node_of[walk.level] << fan_bits(walk.level)) + lane;
+  }
+  [[nodiscard]] std::size_t leaf_of(std::size_t child) const noexcept {
+    return (child * layout_.leaves()) >> layout_.depth();
   }
 
   /// A key's lower bound: its number without the child in the last four bits. NaN stands for `none`.

@@ -167,13 +167,16 @@ public:
     parts_.blocks.for_each({0, leaves()}, visit);
   }
 
-  /// For searches of other headers: the shape, the splits, and one leaf's points offered to a collector.
+  /// For searches of other headers: the shape, the splits, the boxes (up to eight dimensions), and one leaf's
+  /// points offered to a collector.
   [[nodiscard]] const detail::KdLayout& layout() const noexcept { return parts_.layout; }
   [[nodiscard]] const detail::Split<Scalar>& split(unsigned depth, std::size_t slot) const noexcept {
     return parts_.splits[detail::KdLayout::split_at(depth, slot)];
   }
   [[nodiscard]] const detail::LeafBlocks<Scalar>& blocks() const noexcept { return parts_.blocks; }
-  void prefetch_leaf(std::size_t leaf) const noexcept { parts_.blocks.prefetch(leaf); }
+  using Boxes = detail::BoxTree<Scalar>;
+  [[nodiscard]] const Boxes& boxes() const noexcept { return parts_.boxes; }
+  void prefetch_leaf(std::size_t leaf) const noexcept { parts_.blocks.prefetch(leaf, dimension()); }
   template <Collector<Real> C>
   void scan_leaf(std::size_t leaf, const Real* query, C& collector, Work& work) const {
     ++work.leaves;

@@ -73,9 +73,9 @@ public:
   }
 
   /// Asks for the first lines of a leaf ahead of its scan.
-  [[gnu::always_inline]] void prefetch(std::size_t leaf) const noexcept {
-    const auto* bytes = reinterpret_cast<const char*>(block(leaf));
-    const std::size_t lines = std::min<std::size_t>(dim_ * block_size * sizeof(Scalar) / 64, 32);
+  [[gnu::always_inline]] void prefetch(std::size_t leaf, std::size_t dim) const noexcept {
+    const auto* bytes = reinterpret_cast<const char*>(coordinates_.data() + leaf * block_size * dim);
+    const std::size_t lines = std::min<std::size_t>(dim * block_size * sizeof(Scalar) / 64, 32);
     for (std::size_t line = 0; line < lines; ++line) __builtin_prefetch(bytes + 64 * line);
   }
 

@@ -28,6 +28,7 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/index/forest_search.hpp>
 #include <cairn/index/kd_tree.hpp>
 #include <cairn/index/multi_tree_shape.hpp>
 #include <cairn/index/tree_forest.hpp>
@@ -171,8 +172,17 @@ private:
 
   template <Point Query, class C>
   void search_trees(const Query& query, C& collector, Work* work) const {
-    const auto all = trees();
-    for (std::size_t i = all.size(); i-- > 0;) all[i]->search(query, collector, work);
+    if (trees().empty()) return;
+    detail::Scratch<Real> row(dimension());
+    detail::copy_point<Real>(query, dimension(), row.data(), {"MultiKdTree: query", 0});
+    detail::wrap_row(metric_, dimension(), row.data());
+    Work done;
+    if (dimension() <= detail::few_axes)
+      detail::search_in_step(trees(), row.data(), collector, done);
+    else
+      for (std::size_t i = trees().size(); i-- > 0;)
+        trees()[i]->search(std::span<const Real>(row.data(), dimension()), collector, &done);
+    if (work != nullptr) *work += done;
   }
 
   /// Marks the ids of an insertion; takes the marks back unless the insertion went through.
