@@ -65,9 +65,39 @@ TEST_SUITE("tree_file") {
     for (std::size_t at = 0; at < bytes.size(); ++at) {
       CAPTURE(at);
       std::string damaged = bytes;
-      damaged[at] = static_cast<char>(damaged[at] ^ 0x10);
-      CHECK(refusal(damaged).find("a.tree: ") == 0);
+      for (const int flip : {0x10, 0x01, 0x80, 0xff}) {
+        damaged[at] = static_cast<char>(bytes[at] ^ flip);
+        CHECK(refusal(damaged).find("a.tree: ") == 0);
+        CHECK(refusal<cairn::KdTree<float>>(damaged).find("a.tree: ") == 0);
+      }
       CHECK(refusal(bytes.substr(0, at)).find("a.tree: ") == 0);
+    }
+  }
+
+  TEST_CASE("tree_file: sizes that fit the bytes but are not those saved are noticed") {
+    const std::string bytes = saved(make_tree(40));  // 40 (1 + 3) numbers
+    std::string other = bytes;
+    other[16] = 4;  // 32 (1 + 4) are as many
+    other[24] = 32;
+    CHECK(refusal<cairn::KdTree<float>>(other).find("the checksum is wrong") != std::string::npos);
+  }
+
+  TEST_CASE("tree_file: a file of random bytes behind a good beginning is refused, without much memory") {
+    cairn::Random random(cairn_test::seed(91));
+    const std::string bytes = saved(make_tree(40));
+    for (int round = 0; round < 3000; ++round) {
+      std::string damaged = bytes.substr(0, 12 + random.below(bytes.size() - 12));
+      const std::size_t changes = 1 + random.below(20);
+      for (std::size_t i = 0; i < changes; ++i) {
+        const std::size_t at = 12 + random.below(damaged.size() + 40 - 12);
+        const auto byte = static_cast<char>(random.below(256));
+        if (at < damaged.size())
+          damaged[at] = byte;
+        else
+          damaged.push_back(byte);
+      }
+      if (damaged == bytes) continue;
+      REQUIRE(refusal<cairn::KdTree<float>>(damaged).find("a.tree: ") == 0);
     }
   }
 

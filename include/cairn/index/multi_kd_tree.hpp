@@ -75,7 +75,11 @@ public:
   /// was.
   template <PointSet Points>
   PointId insert(const Points& points) {
-    std::vector<PointId> ids(static_cast<std::size_t>(points.size()));
+    const auto count = static_cast<std::size_t>(points.size());
+    if (count > no_point - state_.size())
+      raise("MultiKdTree::insert: " + std::to_string(count) + " points after " +
+            std::to_string(state_.size()) + " ids given, at most 2^32 - 1 can be");
+    std::vector<PointId> ids(count);
     const auto first = static_cast<PointId>(state_.size());
     for (std::size_t i = 0; i < ids.size(); ++i) ids[i] = first + static_cast<PointId>(i);
     insert(points, ids);
@@ -99,14 +103,17 @@ public:
     updates_ = now;
   }
 
-  /// Forgets a point; false where there is none of that id. O(1), and O(n log n) each time half are dead, or
-  /// as a merge where merges are not done at once.
+  /// Forgets a point; false where there is none of that id. Where memory runs out nothing has changed. O(1),
+  /// and O(n log n) each time half are dead, or as a merge where merges are not done at once.
   bool erase(PointId id) {
     if (!contains(id)) return false;
-    state_[id] = PointState::erased;
+    Leaving mark{state_[id]};
+    const std::uint64_t now = updates_ + 1;
+    forest_.advance(now);
+    if (2 * (live_ - 1) < forest_.stored()) forest_.shrink({dimension(), metric_, state_, live_ - 1, now});
+    mark.committed = true;
     --live_;
-    forest_.advance(++updates_);
-    if (2 * live_ < forest_.stored()) forest_.shrink({dimension(), metric_, state_, live_, updates_});
+    updates_ = now;
     return true;
   }
 
@@ -188,7 +195,8 @@ private:
   /// Marks the ids of an insertion; takes the marks back unless the insertion went through.
   class Entering {
   public:
-    Entering(std::vector<PointState>& state, std::span<const PointId> ids) : state_(state), ids_(ids) {
+    Entering(std::vector<PointState>& state, std::span<const PointId> ids)
+        : state_(state), ids_(ids), old_size_(state.size()) {
       const PointId last = *std::max_element(ids.begin(), ids.end());
       CAIRN_EXPECTS(last != no_point, "MultiKdTree::insert: no_point is not an id");
       if (last >= state.size()) state.resize(std::size_t{last} + 1, PointState::unknown);
@@ -201,13 +209,27 @@ private:
     Entering& operator=(const Entering&) = delete;
     ~Entering() {
       for (const PointId id : ids_) state_[id] = committed_ ? PointState::live : PointState::unknown;
+      if (!committed_) state_.resize(old_size_);  // so that the next insertion gets the same ids
     }
     void commit() noexcept { committed_ = true; }
 
   private:
     std::vector<PointState>& state_;
     std::span<const PointId> ids_;
+    std::size_t old_size_;
     bool committed_ = false;
+  };
+
+  /// Marks a point as erased; takes the mark back unless the erasure went through.
+  struct Leaving {
+    explicit Leaving(PointState& of) noexcept : state(of) { state = PointState::erased; }
+    Leaving(const Leaving&) = delete;
+    Leaving& operator=(const Leaving&) = delete;
+    ~Leaving() {
+      if (!committed) state = PointState::live;
+    }
+    PointState& state;
+    bool committed = false;
   };
 
   [[no_unique_address]] M metric_;

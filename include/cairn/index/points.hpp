@@ -5,7 +5,8 @@
 /// What may be put into an index: anything with size() and [i] that gives something with [axis].
 ///
 /// std::vector<std::array<float, 3>>, C arrays, std::vector<Eigen::Vector3d>, spans and foreign point types
-/// with operator[] all qualify as they are. Rows views flat memory as points.
+/// with operator[] all qualify as they are. Rows views flat memory as points, so also the columns of an Eigen
+/// matrix; Through views points that have no operator[]. None of them copies.
 #pragma once
 
 #include <cmath>
@@ -15,6 +16,7 @@
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <cairn/core/check.hpp>
@@ -59,6 +61,45 @@ public:
 private:
   std::span<const Scalar> numbers_;
   std::size_t dim_;
+};
+
+/// A set of points seen through a function that gives their coordinates:
+///
+///   cairn::Through points(cloud, 3, [](const Foreign& p, std::size_t axis) { return (&p.x)[axis]; });
+///
+/// Refers to the set, which must live as long.
+template <class Set, class Coordinate>
+class Through {
+public:
+  /// One point, seen so; valid as long as the set's point is.
+  class View {
+  public:
+    using size_type = std::size_t;
+    [[nodiscard]] auto operator[](std::size_t axis) const { return (*coordinate_)((*set_)[i_], axis); }
+
+  private:
+    friend class Through;
+    View(const Set* set, std::size_t i, const Coordinate* coordinate)
+        : set_(set), i_(i), coordinate_(coordinate) {}
+    const Set* set_;
+    std::size_t i_;
+    const Coordinate* coordinate_;
+  };
+
+  /// `coordinate(point, axis)` for axis < `dim`. Throws Error for dimension 0.
+  Through(const Set& set, std::size_t dim, Coordinate coordinate)
+      : set_(&set), dim_(dim), coordinate_(std::move(coordinate)) {
+    if (dim == 0) raise("Through: a point needs at least one coordinate, got dimension 0");
+  }
+
+  [[nodiscard]] std::size_t size() const noexcept { return static_cast<std::size_t>(set_->size()); }
+  [[nodiscard]] std::size_t dimension() const noexcept { return dim_; }
+  [[nodiscard]] View operator[](std::size_t i) const { return View(set_, i, &coordinate_); }
+
+private:
+  const Set* set_;
+  std::size_t dim_;
+  Coordinate coordinate_;
 };
 
 namespace detail {
@@ -128,11 +169,17 @@ template <std::size_t Dim, PointSet Points>
   return points.size() == 0 ? 0 : size_of_point(points[0], 0);
 }
 
+/// Throws Error where there are more points than ids.
+inline void check_count(std::size_t count, const char* what) {
+  if (count >= 0xffffffffULL)
+    raise(std::string(what) + ": at most 2^32 - 2 points can be numbered, got " + std::to_string(count));
+}
+
 /// All points as rows of `dim` numbers, checked.
 template <class Scalar, PointSet Points>
 [[nodiscard]] std::vector<Scalar> copy_points(const Points& points, std::size_t dim, const char* what) {
   const auto count = static_cast<std::size_t>(points.size());
-  if (count >= 0xffffffffULL) raise(std::string(what) + ": at most 2^32 - 2 points can be numbered");
+  check_count(count, what);
   if (count > 0 && dim == 0) raise(std::string(what) + ": a point needs at least one coordinate");
   std::vector<Scalar> rows(count * dim);
   for (std::size_t i = 0; i < count; ++i)

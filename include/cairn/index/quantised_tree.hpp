@@ -38,6 +38,7 @@ public:
   explicit QuantisedTree(const Points& points) : points_(&points), low_(detail::dimension_of<Dim>(points)) {
     if (points.size() == 0) return;
     const std::size_t dim = low_.size();
+    detail::check_count(static_cast<std::size_t>(points.size()), "QuantisedTree: point");
     std::vector<std::uint8_t> codes(static_cast<std::size_t>(points.size()) * dim);
     learn(points);
     std::vector<float> row(dim);

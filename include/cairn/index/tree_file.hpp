@@ -9,7 +9,7 @@
 ///   12-15        bytes a coordinate (1, 4 or 8)
 ///   16-23        dimension
 ///   24-31        points
-///   32-39        FNV-1a checksum (64 bits) of all bytes from 40 on
+///   32-39        FNV-1a checksum (64 bits) of bytes 8-31 and of all from 40 on
 ///   40-          ids (4 bytes each), then coordinates, point by point in leaf order
 ///
 /// Loading checks the sum and every coordinate and splits the points anew, so that no damaged file makes a
@@ -59,6 +59,16 @@ std::span<const char> bytes_of(const std::vector<T>& numbers) noexcept {
   return {reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(T)};
 }
 
+/// Of everything but the magic and itself: also a header whose sizes were exchanged for others that fit is
+/// noticed.
+template <class Scalar>
+std::uint64_t checksum_of(const TreeFileHeader& header, const std::vector<PointId>& ids,
+                          const std::vector<Scalar>& rows) noexcept {
+  std::array<char, 24> sizes;
+  std::memcpy(sizes.data(), &header.version, sizes.size());
+  return fnv1a(bytes_of(rows), fnv1a(bytes_of(ids), fnv1a(sizes)));
+}
+
 /// Reads `count` numbers a piece at a time, so that a header that promises too much costs no memory.
 template <class T>
 std::vector<T> read_numbers(std::istream& in, std::uint64_t count, const std::string& name) {
@@ -92,7 +102,7 @@ void save_tree(std::ostream& out, const KdTree<Scalar, Dim, M>& tree) {
   header.scalar_bytes = sizeof(Scalar);
   header.dimension = tree.dimension();
   header.points = tree.size();
-  header.checksum = detail::fnv1a(detail::bytes_of(rows), detail::fnv1a(detail::bytes_of(ids)));
+  header.checksum = detail::checksum_of(header, ids, rows);
   out.write(reinterpret_cast<const char*>(&header), sizeof(header));
   for (const std::span<const char> part : {detail::bytes_of(ids), detail::bytes_of(rows)})
     out.write(part.data(), static_cast<std::streamsize>(part.size()));
@@ -120,7 +130,7 @@ template <class Tree, class Scalar = typename Tree::Coordinate>
   if (header.points >= no_point) raise(name + ": " + std::to_string(header.points) + " points are too many");
   const auto ids = detail::read_numbers<PointId>(in, header.points, name);
   const auto rows = detail::read_numbers<Scalar>(in, header.points * header.dimension, name);
-  if (detail::fnv1a(detail::bytes_of(rows), detail::fnv1a(detail::bytes_of(ids))) != header.checksum)
+  if (detail::checksum_of(header, ids, rows) != header.checksum)
     raise(name + ": the checksum is wrong, the tree file is damaged");
   if (ids.empty()) return Tree();
   return Tree(Rows<Scalar>(rows, header.dimension), std::span<const PointId>(ids), std::move(metric));
