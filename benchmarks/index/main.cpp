@@ -1,11 +1,20 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <string_view>
+#include <vector>
+
 #include "areas.hpp"
 
-int main() {
+/// Without arguments all rows; otherwise the parts named: low, descriptors, growing.
+int main(int argc, char** argv) {
+  const std::vector<std::string_view> parts(argv + 1, argv + argc);
+  const auto wanted = [&](std::string_view part) {
+    return parts.empty() || std::find(parts.begin(), parts.end(), part) != parts.end();
+  };
   cairn_bench::Scoreboard board("index");
-  cairn_bench::score_low_dimensions(board);
-  cairn_bench::score_descriptors(board);
-  cairn_bench::score_growing(board);
+  if (wanted("low")) cairn_bench::score_low_dimensions(board);
+  if (wanted("descriptors")) cairn_bench::score_descriptors(board);
+  if (wanted("growing")) cairn_bench::score_growing(board);
   return board.finish();
 }
