@@ -145,7 +145,8 @@ template <class Filter = Kalman, LinearisedProcess F, LinearisedMeasurement H>
                                        const NoiseFitting& options = {}, const Filter& filter = {}) {
   using Q = CovarianceOf<typename F::State>;
   using R = CovarianceOf<typename H::Measurement>;
-  NoiseFit<F, H> fit{Q{}, R(sensor.noise(record.prior.mean)), {}, Status::depleted};
+  const int n = dof_of(record.prior.mean);
+  NoiseFit<F, H> fit{Q::Zero(n, n).eval(), R(sensor.noise(record.prior.mean)), {}, Status::depleted};
   if (record.steps.empty()) return fit;
   fit.process = process.noise(record.prior.mean, record.steps[0].control, record.steps[0].dt);
   if (options.rounds < 0 || !(options.tolerance >= 0.0)) {

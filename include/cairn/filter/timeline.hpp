@@ -24,6 +24,7 @@
 #include <variant>
 #include <vector>
 
+#include <cairn/core/check.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/status.hpp>
@@ -41,7 +42,9 @@ public:
   /// The belief `prior` at `time` [s], `control` from then on; events may come up to `horizon` [s] late.
   Timeline(const Filter& filter, const F& process, const Gaussian<State>& prior, double time,
            const Control& control, double horizon)
-      : filter_(filter), process_(process), horizon_(horizon), base_{time, control, prior} {}
+      : filter_(filter), process_(process), horizon_(horizon), base_{time, control, prior} {
+    CAIRN_EXPECTS(horizon >= 0.0 && time - time == 0.0, "a Timeline needs a finite time and a horizon >= 0");
+  }
 
   /// The control is u from `time` until the next such event. Refused: as measure(), or where a prediction is.
   Status steer(const Control& u, double time) { return insert(Event({time, u, base_.after}, Steering{})); }
