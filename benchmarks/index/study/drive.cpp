@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "study/drive.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <ctime>
 #include <limits>
@@ -102,12 +103,13 @@ Truth make_truth(const Stream& stream) {
   return truth;
 }
 
-Drive run(const Stream& stream, const Truth& truth, Store& store, std::size_t stride, bool exact,
+Drive run(const Stream& stream, const Truth& truth, Store& store, const RunOptions& options,
           const std::function<void()>& progress) {
   Drive drive;
-  drive.stride = stride;
-  std::vector<float> queries(stream.timed * stream.dim);
-  std::vector<Found> answers(stream.timed);
+  drive.stride = options.stride;
+  const std::size_t timed = std::min(options.timed, stream.timed);
+  std::vector<float> queries(timed * stream.dim);
+  std::vector<Found> answers(timed);
   std::uint64_t moved = 0;
   const std::vector<std::size_t> checks = checked_steps(stream);
   for (std::size_t step = 0; step < stream.steps(); ++step, progress()) {
@@ -115,12 +117,11 @@ Drive run(const Stream& stream, const Truth& truth, Store& store, std::size_t st
         std::span(stream.rows).subspan(step * stream.step * stream.dim, stream.step * stream.dim);
     const std::size_t present = (step + 1) * stream.step;
     const bool is_checked = std::find(checks.begin(), checks.end(), step) != checks.end();
-    if ((step + 1) % stride != 0 && !is_checked) {
+    if ((step + 1) % options.stride != 0 && !is_checked) {
       store.stage(rows);
       continue;
     }
-    for (std::size_t i = 0; i < stream.timed; ++i)
-      stream.make_query(step, i, present, &queries[i * stream.dim]);
+    for (std::size_t i = 0; i < timed; ++i) stream.make_query(step, i, present, &queries[i * stream.dim]);
     Sample sample;
     sample.points = static_cast<double>(present);
     moved = store.points_moved();
@@ -129,16 +130,15 @@ Drive run(const Stream& stream, const Truth& truth, Store& store, std::size_t st
     store.insert(rows);
     sample.build = cpu_seconds() - begin;
     begin = cpu_seconds();
-    for (std::size_t i = 0; i < stream.timed; ++i) answers[i] = store.search(&queries[i * stream.dim]);
+    for (std::size_t i = 0; i < timed; ++i) answers[i] = store.search(&queries[i * stream.dim]);
     sample.search =
-        (cpu_seconds() - begin) * static_cast<double>(stream.queries) / static_cast<double>(stream.timed);
+        (cpu_seconds() - begin) * static_cast<double>(stream.queries) / static_cast<double>(timed);
     sample.bytes = static_cast<double>(store.bytes());
     sample.moved = static_cast<double>(store.points_moved() - moved);
-    sample.distances =
-        static_cast<double>(store.work.distances - distances) / static_cast<double>(stream.timed);
+    sample.distances = static_cast<double>(store.work.distances - distances) / static_cast<double>(timed);
     sample.trees = static_cast<double>(store.trees());
-    if ((step + 1) % stride == 0) drive.samples.push_back(sample);
-    if (is_checked) check(stream, truth, step, store, exact, drive);
+    if ((step + 1) % options.stride == 0) drive.samples.push_back(sample);
+    if (is_checked) check(stream, truth, step, store, options.exact, drive);
   }
   return drive;
 }

@@ -70,9 +70,14 @@ struct Drive {
   double kept = 0;        ///< of them, found
 };
 
-/// Runs a stream through a store. `exact`: every answer must be the nearest. `progress` is called after every
-/// step.
-Drive run(const Stream& stream, const Truth& truth, Store& store, std::size_t stride, bool exact,
+struct RunOptions {
+  std::size_t stride = 1;  ///< every so many-th step is timed
+  std::size_t timed = 1;   ///< queries of a step that are asked
+  bool exact = false;      ///< every answer must be the nearest
+};
+
+/// Runs a stream through a store. `progress` is called after every step.
+Drive run(const Stream& stream, const Truth& truth, Store& store, const RunOptions& options,
           const std::function<void()>& progress);
 
 }  // namespace cairn_study
