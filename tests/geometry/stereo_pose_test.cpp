@@ -343,6 +343,27 @@ TEST_SUITE("stereo_pose") {
       }
   }
 
+  TEST_CASE("estimate_stereo_pose: wrong landmarks beside the camera, vague along the view, have no say") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const StereoRig rig = cairn_test::rectified_rig();
+    const SE3 T = random_pose(random);
+    auto matches = random_matches(rig, T, {.matches = 200, .landmark_sigma = 0.005}, random);
+    for (std::size_t i = 0; i < 60; ++i) {  // in front by a hand, aside by a street; sure but for the depth
+      const Vector<3> p(random.uniform(-40, 40), random.uniform(-5, 5), random.uniform(0.02, 0.3));
+      const Vector<3> view = T.rotation() * p.normalized();
+      matches[3 * i].landmark = T * p;
+      matches[3 * i].covariance = 6 * view * view.transpose() + 1e-5 * Matrix<3>::Identity();
+    }
+    const StereoPose pose = estimate_stereo_pose(rig, matches);
+    REQUIRE(pose.good());
+    check_sound(pose, matches.size());
+    CHECK(pose.inlier_count > 120);
+    CHECK(cairn::local(T, pose.T_world_camera).head<3>().norm() < 0.01);
+    for (std::size_t i = 0; i < 60; ++i) CHECK(pose.inliers[3 * i] == 0);
+  }
+
   TEST_CASE("estimate_stereo_pose: a mirrored map is not accepted") {
     cairn::Random random(cairn_test::seed());
     const StereoRig rig = cairn_test::rectified_rig();

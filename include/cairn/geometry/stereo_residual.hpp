@@ -174,6 +174,17 @@ struct alignas(Lane) StereoResidual {
                   r.b[2] * (C[2] * g[0] + C[4] * g[1] + C[5] * g[2]);
 }
 
+using LaneMask = decltype(Lane{} < Lane{});
+
+/// Keeps the lanes of `seen` whose point is in front of a camera and no farther off its axis than any pinhole
+/// image reaches: beside the camera, derivatives grow until the differences in (2) to (4) are all rounding.
+[[gnu::always_inline]] inline void keep_in_sight(const Lane (&p)[3], double nearest,
+                                                 LaneMask& seen) noexcept {
+  constexpr double widest = 10;  // tangent of 84 degrees
+  const Lane reach = widest * p[2];
+  seen &= (p[2] > nearest) & (p[0] < reach) & (-p[0] < reach) & (p[1] < reach) & (-p[1] < reach);
+}
+
 /// Statistics of four matches at a view. Where all chi^2 are surely above `gate` they are left at bounds
 /// above it, and gradient and information are not computed: most wrong matches need no more than that.
 [[gnu::always_inline]] inline bool evaluate(const MatchLanes& m, const StereoView& view, double gate,
@@ -185,7 +196,9 @@ struct alignas(Lane) StereoResidual {
     p[i] = y[0] * L[3 * i] + y[1] * L[3 * i + 1] + y[2] * L[3 * i + 2];
     q[i] = y[0] * R[3 * i] + y[1] * R[3 * i + 1] + y[2] * R[3 * i + 2] + view.t_right_left[i];
   }
-  const auto seen = (p[2] > view.nearest) & (q[2] > view.nearest) & (m.usable > 0.0);
+  LaneMask seen = m.usable > 0.0;
+  keep_in_sight(p, view.nearest, seen);
+  keep_in_sight(q, view.nearest, seen);
   const Lane one = {1, 1, 1, 1}, infinite = one / 0.0;
   p[2] = seen ? p[2] : one;
   q[2] = seen ? q[2] : one;
