@@ -4,22 +4,11 @@
 
 #include <vector>
 
-#include <Eigen/Geometry>
-
 #ifdef CAIRN_BENCH_OPENCV_CALIB3D
 #include <opencv2/calib3d.hpp>
 #endif
 
 namespace rivals {
-
-cairn::Matrix<4> umeyama(std::span<const cairn::Vector<3>> source, std::span<const cairn::Vector<3>> target) {
-  const auto columns = [](std::span<const cairn::Vector<3>> points) {
-    cairn::Matrix<3, cairn::dynamic> m(3, static_cast<Eigen::Index>(points.size()));
-    for (std::size_t i = 0; i < points.size(); ++i) m.col(static_cast<Eigen::Index>(i)) = points[i];
-    return m;
-  };
-  return Eigen::umeyama(columns(source), columns(target), false);
-}
 
 #ifdef CAIRN_BENCH_OPENCV_CALIB3D
 
@@ -77,17 +66,19 @@ std::optional<cairn::SE3> affine(const cairn::StereoRig& rig, std::span<const ca
 
 }  // namespace
 
+#endif
+
 std::span<const PoseRival> pose_rivals() {
-  static const PoseRival all[] = {{"OpenCV solvePnPRansac + LM", &pnp}, {"OpenCV estimateAffine3D", &affine}};
+  static const std::vector<PoseRival> all = {
+#ifdef CAIRN_BENCH_OPENCV_CALIB3D
+      {"OpenCV solvePnPRansac + LM", &pnp},
+      {"OpenCV estimateAffine3D", &affine},
+#endif
+#ifdef CAIRN_BENCH_OPENGV
+      {"OpenGV 3-point RANSAC + LM", &opengv_pose},
+#endif
+  };
   return all;
 }
-
-#else
-
-std::span<const PoseRival> pose_rivals() {
-  return {};
-}
-
-#endif
 
 }  // namespace rivals

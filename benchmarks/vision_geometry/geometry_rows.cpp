@@ -198,16 +198,20 @@ void add_alignment(Scoreboard& board) {
     p = Vector<3>(random.normal(), random.normal(), random.normal());
     target.push_back(T * p);
   }
-  const double difference =
-      (cairn::align_points(source, target).T_target_source.matrix() - rivals::umeyama(source, target)).norm();
-  const auto timings = cairn_bench::interleave(
-      {{"cairn", [&] { cairn_bench::do_not_optimise(cairn::align_points(source, target).rms); }, 1},
-       {"Eigen::umeyama", [&] { cairn_bench::do_not_optimise(rivals::umeyama(source, target)(0, 0)); }, 1}});
-  Row row =
-      cairn_bench::against_rival("alignment of 500 points, with covariance", 1e6 * timings[0].median,
-                                 1e6 * timings[1].median, "Eigen::umeyama", std::nullopt, std::nullopt, "us");
-  row.note += text(", answers differ by %.1e", difference);
-  board.add(row);
+  const cairn::Matrix<4> answer = cairn::align_points(source, target).T_target_source.matrix();
+  const std::vector<rivals::AlignmentRival> all = rivals::alignment_rivals(source, target);
+  std::vector<cairn_bench::Contender> contenders{
+      {"cairn", [&] { cairn_bench::do_not_optimise(cairn::align_points(source, target).rms); }, 1}};
+  for (const rivals::AlignmentRival& rival : all)
+    contenders.push_back({rival.name, [&] { cairn_bench::do_not_optimise(rival.solve()(0, 0)); }, 1});
+  const auto timings = cairn_bench::interleave(contenders);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    Row row = cairn_bench::against_rival("alignment of 500 points, with covariance, against " + all[i].name,
+                                         1e6 * timings[0].median, 1e6 * timings[i + 1].median, all[i].name,
+                                         std::nullopt, std::nullopt, "us");
+    row.note += text(", answers differ by %.1e", (all[i].solve() - answer).norm());
+    board.add(row);
+  }
 }
 
 void add_triangulation(Scoreboard& board) {
