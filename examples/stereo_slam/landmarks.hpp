@@ -29,6 +29,8 @@ struct Landmark {
   std::int8_t sign = 0;  ///< of the Laplacian: -1 bright, +1 dark
   std::uint8_t grey = 0;
   int first_seen = 0;  ///< step
+  int last_seen = 0;   ///< step whose pose and pixels the position was last computed from
+  cairn::Vector<2> left_pixel = cairn::Vector<2>::Zero(), right_pixel = cairn::Vector<2>::Zero();  ///< then
   int sightings = 1;
 };
 
@@ -55,6 +57,7 @@ public:
   [[nodiscard]] Landmark& operator[](LandmarkId id) { return landmarks_[place_.at(id)]; }
   [[nodiscard]] const Landmark& operator[](LandmarkId id) const { return landmarks_[place_.at(id)]; }
   [[nodiscard]] const std::vector<Landmark>& all() const noexcept { return landmarks_; }
+  [[nodiscard]] std::vector<Landmark>& all() noexcept { return landmarks_; }
   [[nodiscard]] std::size_t size() const noexcept { return landmarks_.size(); }
 
 private:

@@ -62,6 +62,8 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
       ->capture_default_str();
   app.add_flag("--oriented", arguments.pipeline.oriented,
                "oriented SURF, for cameras that roll (default: upright)");
+  app.add_flag("--calibrate", arguments.pipeline.calibrate,
+               "correct the rig's calibration while moving, for rigs that come loose (default: trust it)");
   app.add_option("--script", arguments.dataset.arena.script,
                  "arena: turn (on the spot), loop (two laps) or spiral")
       ->check(CLI::IsMember({"turn", "loop", "spiral"}))

@@ -87,6 +87,7 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options)
       surf_right_(surf_options(options), std::max(1U, options.threads / 2)),
       match_stereo_(rig, options.stereo),
       triangulate_(rig, triangulation_options(options, rig)),
+      calibration_(rig, options.calibration),
       store_(make_landmark_store(options.store)),
       pose_covariance_(cairn::Matrix<6>::Zero()) {
   record_.seed = options.seed;
@@ -113,6 +114,7 @@ const FrameRecord& Pipeline::step(const StereoFrame& frame, double load_millisec
       refine_landmarks(located->agreed);
       extend_map(located->agreed, frame);
       close_step();
+      if (options_.calibrate) calibrate(located->agreed);
     } else {
       T_last_camera_ = cairn::SE3();
       record_.notes.push_back(frame.name + ": lost, " + std::to_string(matches.size()) +
@@ -285,11 +287,15 @@ void Pipeline::refine_landmarks(const std::vector<Match>& agreed) {
   const cairn::Kalman filter{.gate = options_.landmark_gate};
   for (const Match& match : agreed) {
     Landmark& landmark = landmarks_[match.landmark];
-    const cairn::Gaussian<cairn::Vector<3>> seen = in_world(locals_[match.local]);
-    const double sigma = options_.landmark_noise * locals_[match.local].position(2);
+    const LocalLandmark& local = locals_[match.local];
+    const cairn::Gaussian<cairn::Vector<3>> seen = in_world(local);
+    const double sigma = options_.landmark_noise * local.position(2);
     if (filter.predict(landmark.position, StandingStill{sigma}, 1.0) != cairn::Status::accepted) continue;
     if (!filter.update(landmark.position, SeenAt{seen.covariance}, seen.mean).accepted()) continue;
     ++landmark.sightings;
+    landmark.last_seen = step_;
+    landmark.left_pixel = local.left_pixel;
+    landmark.right_pixel = local.right_pixel;
     store_->sighted(match.landmark);
   }
 }
@@ -310,7 +316,9 @@ void Pipeline::extend_map(const std::vector<Match>& agreed, const StereoFrame& f
     landmark.sign = point.laplacian;
     landmark.grey =
         frame.left(static_cast<int>(std::lround(point.x)), static_cast<int>(std::lround(point.y)));
-    landmark.first_seen = step_;
+    landmark.first_seen = landmark.last_seen = step_;
+    landmark.left_pixel = local.left_pixel;
+    landmark.right_pixel = local.right_pixel;
     landmarks_.add(landmark);
   }
 }
@@ -319,6 +327,36 @@ void Pipeline::extend_map(const std::vector<Match>& agreed, const StereoFrame& f
 void Pipeline::close_step() {
   const StageTimer timer(record_.frames.back(), Stage::store);
   for (const LandmarkId id : store_->advance()) landmarks_.remove(id);
+}
+
+/// What the landmarks' motion in the images says of the rig.
+void Pipeline::calibrate(const std::vector<Match>& agreed) {
+  const StageTimer timer(record_.frames.back(), Stage::update);
+  std::vector<Sighting> sightings;
+  sightings.reserve(agreed.size());
+  for (const Match& match : agreed) {
+    const LocalLandmark& local = locals_[match.local];
+    sightings.push_back({match.landmark, local.left_pixel, local.right_pixel, local.sigma});
+  }
+  if (calibration_.observe(T_world_camera_, std::move(sightings))) take_rig(calibration_.rig());
+}
+
+/// Another rig puts what was seen elsewhere: landmarks move as their last sighting does.
+void Pipeline::take_rig(const cairn::StereoRig& rig) {
+  const cairn::Triangulator triangulate(rig, triangulation_options(options_, rig));
+  for (Landmark& landmark : landmarks_.all()) {
+    const cairn::Triangulation before = triangulate_(landmark.left_pixel, landmark.right_pixel);
+    const cairn::Triangulation after = triangulate(landmark.left_pixel, landmark.right_pixel);
+    if (!before.good() || !after.good()) continue;
+    const cairn::SE3& pose =
+        landmark.last_seen == step_
+            ? T_world_camera_
+            : record_.frames[static_cast<std::size_t>(landmark.last_seen)].T_world_camera;
+    landmark.position.mean += pose.rotation() * (after.point - before.point);
+  }
+  rig_ = rig;
+  triangulate_ = triangulate;
+  match_stereo_ = StereoMatcher(rig, options_.stereo);
 }
 
 void Pipeline::earliest_first(std::vector<Match>& matches) const {

@@ -32,6 +32,7 @@
 #include "landmark_store.hpp"
 #include "landmarks.hpp"
 #include "run_record.hpp"
+#include "self_calibration.hpp"
 #include "stereo_matcher.hpp"
 
 namespace stereo_slam {
@@ -44,6 +45,10 @@ struct PipelineOptions {
   bool oriented = false;         ///< SURF with orientation, for cameras that roll
   StoreOptions store;
   StereoMatcherOptions stereo;
+
+  bool calibrate = false;  ///< correct the rig's calibration while moving (self_calibration.hpp)
+  cairn::CalibrationDriftOptions calibration = {
+      .initial_sigma = 2e-4, .walk_rotation = 1e-5, .walk_baseline = 1e-6};
 
   double pixel_sigma = 0.7;       ///< noise of a point's coordinates at the finest scale [pixels]
   float fine_scale = 4;           ///< up to this scale; above, the noise grows with it [pixels]
@@ -97,6 +102,8 @@ private:
   void refine_landmarks(const std::vector<Match>& agreed);
   void extend_map(const std::vector<Match>& agreed, const StereoFrame& frame);
   void close_step();
+  void calibrate(const std::vector<Match>& agreed);
+  void take_rig(const cairn::StereoRig& rig);
 
   void second_look(const cairn::SE3& T_world_camera, std::vector<Match>& matches) const;
   [[nodiscard]] cairn::StereoPose decide_by_earliest(const std::vector<Match>& agreed,
@@ -116,6 +123,7 @@ private:
   const cairn::Features* right_ = nullptr;
   StereoMatcher match_stereo_;
   cairn::Triangulator triangulate_;
+  SelfCalibration calibration_;
   std::unique_ptr<LandmarkStore> store_;
   Landmarks landmarks_;
   std::vector<LocalLandmark> locals_;

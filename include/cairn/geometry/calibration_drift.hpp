@@ -5,15 +5,12 @@
 /// Keeps a stereo rig calibrated while it is used: a Kalman filter on the five numbers that epipolar
 /// residuals can see.
 ///
-/// State (w_x, w_y, w_z, t_y, t_z): a right rotation of the right camera [rad], and the direction of the
-/// baseline, turned by angles towards the second and third of the orthonormal axes u1 = t0/|t0|, u2 near y,
-/// u3:
-///   R = R0 exp(w),   t / |t| = (u1 + t_y u2 + t_z u3) / |...|                            (1)
-/// Its length is not observable. Random walk; each match is one scalar measurement, the epipolar constraint
-/// e = a . (t x R b) = 0 divided by its standard deviation, with
-///   d e / d w = b x R^T (a x t),   d e / d t = R b x a                                   (2)
+/// State: that of rig_correction.hpp, R = R0 exp(w) and the direction of the baseline t.
+/// Random walk; each match is one scalar measurement, the epipolar constraint e = a . (t x R b) = 0 divided
+/// by its standard deviation, with
+///   d e / d w = b x R^T (a x t),   d e / d t = R b x a                                   (1)
 /// Vertical disparity sees w_x and w_z well, w_y only through x y and through the spread of depth: its
-/// variance says so, and it is the one that ruins depth (d z = z^2 w_y / b).
+/// variance says so, and it is the one that ruins depth (d z = z^2 w_y / b). Motion sees it: update_moved().
 #pragma once
 
 #include <algorithm>
@@ -26,6 +23,8 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
+#include <cairn/geometry/motion_calibration.hpp>
+#include <cairn/geometry/rig_correction.hpp>
 #include <cairn/geometry/stereo_rig.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
@@ -60,22 +59,13 @@ struct CalibrationHealth {
 class CalibrationDrift {
 public:
   explicit CalibrationDrift(const StereoRig& nominal, const CalibrationDriftOptions& options = {})
-      : nominal_(nominal), options_(options), state_(Vector<5>::Zero()) {
-    CAIRN_EXPECTS(nominal.baseline() > 0, "CalibrationDrift: the rig needs a baseline");
-    const Vector<3> u1 = nominal.T_left_right.translation() / nominal.baseline();
-    const int least = std::abs(u1(1)) < 0.9 ? 1 : 2;
-    Vector<3> u2 = Vector<3>::Unit(least) - u1(least) * u1;
-    u2 /= u2.norm();
-    axes_ << u1, u2, detail::cross<double>(u1, u2);
+      : correction_(nominal), options_(options), state_(Vector<5>::Zero()) {
     covariance_ = Matrix<5>::Identity() * options.initial_sigma * options.initial_sigma;
   }
 
   /// The rig with the correction so far.
   [[nodiscard]] StereoRig corrected() const {
-    if (!options_.enabled) return nominal_;
-    StereoRig rig = nominal_;
-    rig.T_left_right = SE3(rotation(), nominal_.baseline() * direction());
-    return rig;
+    return options_.enabled ? correction_.rig(state_) : correction_.nominal();
   }
 
   [[nodiscard]] const Vector<5>& state() const noexcept { return state_; }
@@ -87,7 +77,7 @@ public:
     CalibrationHealth health;
     health.distance_before = typical_distance(rays);
     if (options_.enabled && !rays.empty()) {
-      walk();
+      walk(1);
       if (surprised(rays)) start_again(rays);
       for (const Rays& pair : rays) (absorb(pair) ? health.used : health.gated) += 1;
       covariance_ = symmetrised(covariance_);
@@ -95,6 +85,20 @@ public:
     health.distance_after = typical_distance(rays);
     health.healthy = health.distance_after < options_.unhealthy_distance;
     return health;
+  }
+
+  /// Takes points seen before and after a motion, `frames` frames apart; `guess` is about the motion. Sees
+  /// the yaw. The epipolar constraints of these points are part of it: do not give them to update() as well.
+  /// O(points).
+  MotionCalibration update_moved(std::span<const MovedPair> pairs, const SE3& guess, int frames = 1,
+                                 const MotionCalibrationOptions& options = {}) {
+    CAIRN_EXPECTS(frames > 0, "CalibrationDrift: expected a motion of at least one frame");
+    if (!options_.enabled) return {state_, covariance_, guess};
+    walk(frames);
+    MotionCalibration result = calibrate_from_motion(correction_, state_, covariance_, pairs, guess, options);
+    state_ = result.state;
+    covariance_ = result.covariance;
+    return result;
   }
 
 private:
@@ -108,42 +112,38 @@ private:
     Vector<5> H, PHt;
   };
 
-  [[nodiscard]] SO3 rotation() const { return nominal_.T_left_right.rotation() * SO3::exp(state_.head<3>()); }
-  [[nodiscard]] Vector<3> direction() const {
-    const Vector<3> along = axes_ * Vector<3>(1, state_(3), state_(4));
-    return along / along.norm();
-  }
-
   [[nodiscard]] std::vector<Rays> normalise(std::span<const PixelPair> pairs) const {
     std::vector<Rays> rays;
+    const StereoRig& rig = correction_.nominal();
     rays.reserve(pairs.size());
     for (const PixelPair& pair : pairs) {
-      const auto l = nominal_.left.normalise(pair.left), r = nominal_.right.normalise(pair.right);
+      const auto l = rig.left.normalise(pair.left), r = rig.right.normalise(pair.right);
       if (l && r) rays.push_back({*l, *r});
     }
     return rays;
   }
 
-  void walk() {
+  void walk(int frames) {
     const double rotation = options_.walk_rotation * options_.walk_rotation,
                  baseline = options_.walk_baseline * options_.walk_baseline;
-    covariance_.diagonal().head<3>().array() += rotation;
-    covariance_.diagonal().tail<2>().array() += baseline;
+    covariance_.diagonal().head<3>().array() += frames * rotation;
+    covariance_.diagonal().tail<2>().array() += frames * baseline;
   }
 
   [[nodiscard]] Innovation innovation(const Rays& pair) const {
-    const Vector<3> a(pair.left(0), pair.left(1), 1), b(pair.right(0), pair.right(1), 1), t = direction();
-    const Matrix<3> R = rotation().matrix();
+    const Vector<3> a(pair.left(0), pair.left(1), 1), b(pair.right(0), pair.right(1), 1),
+        t = correction_.direction(state_);
+    const Matrix<3> R = correction_.rotation(state_).matrix();
     const Vector<3> m = detail::cross<double>(a, t), Rb = R * b;
     const Vector<3> left_line = detail::cross<double>(t, Rb), right_line = R.transpose() * m;
-    const double fx_l = nominal_.left.fx(), fy_l = nominal_.left.fy(), fx_r = nominal_.right.fx(),
-                 fy_r = nominal_.right.fy();
+    const PinholeCamera &left = correction_.nominal().left, &right = correction_.nominal().right;
+    const double fx_l = left.fx(), fy_l = left.fy(), fx_r = right.fx(), fy_r = right.fy();
     const double sigma =
         options_.pixel_sigma * std::sqrt(squared(left_line(0) / fx_l) + squared(left_line(1) / fy_l) +
                                          squared(right_line(0) / fx_r) + squared(right_line(1) / fy_r));
-    Vector<5> H;  // (2)
+    Vector<5> H;  // (1)
     H.head<3>() = detail::cross<double>(b, right_line);
-    H.tail<2>() = axes_.rightCols<2>().transpose() * detail::cross<double>(Rb, a);
+    H.tail<2>() = correction_.direction_jacobian().transpose() * detail::cross<double>(Rb, a);
     H /= std::max(sigma, 1e-12);
     Innovation result;
     result.value = -a.dot(left_line) / std::max(sigma, 1e-12);
@@ -175,7 +175,7 @@ private:
   /// Makes the covariance as wide as the residuals are, and leads the state into the basin of most pairs:
   /// reweighted least squares (Cauchy) whose scale follows the median residual down.
   void start_again(const std::vector<Rays>& rays) {
-    const double focal = 0.5 * (nominal_.left.fy() + nominal_.right.fy());
+    const double focal = 0.5 * (correction_.nominal().left.fy() + correction_.nominal().right.fy());
     const double sigma = std::max(options_.initial_sigma, 2 * typical_distance(rays) / focal);
     covariance_ = Matrix<5>::Identity() * sigma * sigma;
     const Vector<5> before = state_;
@@ -206,9 +206,8 @@ private:
 
   [[nodiscard]] static double squared(double value) noexcept { return value * value; }
 
-  StereoRig nominal_;
+  RigCorrection correction_;
   CalibrationDriftOptions options_;
-  Matrix<3> axes_;  // u1, u2, u3 of (1)
   Vector<5> state_;
   Matrix<5> covariance_;
 };

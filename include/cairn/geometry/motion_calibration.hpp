@@ -1,0 +1,286 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// Calibrates a stereo rig by moving it: what two stereo pairs of the same rigid scene say of the rig.
+///
+/// One pair's epipolar constraint hardly sees the right camera's yaw w_y, which shifts every disparity alike
+/// and so scales the map: d z = z^2 w_y / b. Moving shows it. Bearings alone tell by which factor a point's
+/// depth changed, and a shifted disparity tells another, the more so the nearer the point: no rigid motion
+/// explains points at all depths. The estimate is least squares over everything that the eight coordinates
+/// of a point in four images depend on: motion d (6), correction c (5, rig_correction.hpp), point X (3),
+///   sum |W (obs - pi(X, T, c))|^2  +  (c - c0)' P0^-1 (c - c0)  ->  min                   (1)
+/// by Gauss-Newton with the points eliminated (the Schur complement: D. Brown, "A solution to the general
+/// problem of multiple station analytical stereotriangulation", 1958; B. Triggs et al., "Bundle adjustment: a
+/// modern synthesis", 1999, section 6) and Cauchy weights.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/core/statistics.hpp>
+#include <cairn/geometry/pose_equations.hpp>
+#include <cairn/geometry/rig_correction.hpp>
+#include <cairn/geometry/triangulation.hpp>
+#include <cairn/manifold/se3.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+/// A point that both cameras saw before and after a motion.
+struct MovedPair {
+  Vector<2> left_before, right_before, left_after, right_after;  ///< [pixels]
+  double sigma = 0.5;                                            ///< noise in each coordinate [pixels]
+};
+
+struct MotionCalibrationOptions {
+  double gate_probability = 0.999;  ///< share of good points that pass the gate in the end
+  double loss_scale = 3;            ///< of the Cauchy weights, in standard deviations of a point's residual
+  std::size_t min_inliers = 20;     ///< fewer points inside the gate: no consensus
+  double min_share = 0.5;           ///< of the points that must be inside the gate
+  int max_steps = 12;
+};
+
+enum class MotionCalibrationStatus {
+  good,
+  too_few_points,  ///< under min_inliers can be triangulated
+  no_consensus,    ///< the points do not move as one rigid scene
+  degenerate       ///< the motion is undetermined
+};
+
+/// Result. Unless good, state and covariance are those given and the motion is the guess.
+struct MotionCalibration {
+  Vector<5> state;          ///< of the correction, see RigCorrection
+  Matrix<5> covariance;     ///< its posterior
+  SE3 T_before_after;       ///< pose of the left camera after the motion in its frame before
+  std::size_t inliers = 0;  ///< points inside the gate
+  MotionCalibrationStatus status = MotionCalibrationStatus::too_few_points;
+  [[nodiscard]] bool good() const noexcept { return status == MotionCalibrationStatus::good; }
+};
+
+namespace detail {
+
+/// The least-squares problem (1) at its current estimate.
+class MotionCalibrationProblem {
+public:
+  static constexpr int shared = 11;  // motion, then correction
+
+  MotionCalibrationProblem(const RigCorrection& rig, const Vector<5>& state, const SE3& motion,
+                           std::span<const MovedPair> pairs)
+      : rig_(rig), state_(state), motion_(motion) {
+    const StereoRig start = rig.rig(state);
+    const Triangulator triangulate(start, {.max_gap = std::numeric_limits<double>::infinity()});
+    for (const MovedPair& pair : pairs) {
+      if (!(pair.sigma > 0 && std::isfinite(pair.sigma))) continue;
+      const Triangulation point = triangulate(pair.left_before, pair.right_before, pair.sigma, pair.sigma);
+      if (!point.good()) continue;
+      Track track;
+      track.point = point.point;
+      const std::array pixels{pair.left_before, pair.right_before, pair.left_after, pair.right_after};
+      bool usable = true;
+      for (std::size_t v = 0; v < 4; ++v) {
+        const PinholeCamera& camera = v % 2 == 0 ? start.left : start.right;
+        const auto n = camera.normalise_with_jacobian(pixels[v]);
+        usable = usable && n.has_value();
+        if (n) track.views[v] = {n->normalised, n->J_pixel / pair.sigma};
+      }
+      if (usable) tracks_.push_back(track);
+    }
+  }
+
+  [[nodiscard]] std::size_t size() const noexcept { return tracks_.size(); }
+  [[nodiscard]] const Vector<5>& state() const noexcept { return state_; }
+  [[nodiscard]] const SE3& motion() const noexcept { return motion_; }
+
+  /// One step on the points inside `gate` with Cauchy weights of this scale. Its squared length in standard
+  /// deviations, or nothing where the equations are degenerate.
+  [[nodiscard]] std::optional<double> step(const Vector<5>& mean, const Matrix<5>& information, double gate,
+                                           double loss_scale) {
+    Matrix<shared> H;
+    Vector<shared> g;
+    gather(mean, information, gate, loss_scale, H, g);
+    const Eigen::LLT<Matrix<shared>> factor(H);
+    if (factor.info() != Eigen::Success) return std::nullopt;
+    const Vector<shared> d = factor.solve(g);
+    if (!d.allFinite()) return std::nullopt;
+    for (Track& track : tracks_)
+      track.point += track.elimination.solve(Vector<3>(track.gradient - track.coupling * d));
+    motion_ = retract(motion_, Vector<6>(d.head<6>()));
+    state_ += d.tail<5>();
+    return d.dot(g);
+  }
+
+  /// Covariance of the correction by the prior and the points inside `gate`, which tell `efficiency` of what
+  /// least squares would make of them; nothing where the equations are degenerate.
+  [[nodiscard]] std::optional<Matrix<5>> covariance(const Matrix<5>& information, double gate,
+                                                    double efficiency) {
+    Matrix<shared> H;
+    Vector<shared> g;
+    gather(state_, Matrix<5>::Zero(), gate, std::numeric_limits<double>::infinity(), H, g);
+    H *= efficiency;
+    H.bottomRightCorner<5, 5>() += information;
+    const Eigen::LLT<Matrix<shared>> factor(H);
+    if (factor.info() != Eigen::Success) return std::nullopt;
+    const Matrix<shared> inverse = factor.solve(Matrix<shared>::Identity());
+    const Matrix<5> result = symmetrised(Matrix<5>(inverse.bottomRightCorner<5, 5>()));
+    if (!result.allFinite()) return std::nullopt;
+    return result;
+  }
+
+  [[nodiscard]] std::size_t inside(double gate) const {
+    return static_cast<std::size_t>(
+        std::ranges::count_if(tracks_, [&](const Track& track) { return track.chi_squared < gate; }));
+  }
+
+private:
+  struct View {
+    Vector<2> observed;   // normalised
+    Matrix<2> whitening;  // d pixel / d normalised over sigma
+  };
+  struct Track {
+    std::array<View, 4> views;  // left, right before, left, right after
+    Vector<3> point;            // left camera before
+    Matrix<3, shared> coupling = Matrix<3, shared>::Zero();
+    Vector<3> gradient = Vector<3>::Zero();
+    Eigen::LLT<Matrix<3>> elimination{Matrix<3>(Matrix<3>::Identity())};
+    double chi_squared = std::numeric_limits<double>::infinity();
+  };
+  struct Linearised {
+    Matrix<8, 3> J_point;
+    Matrix<8, shared> J_shared;
+    Vector<8> residual;
+  };
+
+  /// Nothing where the point is behind a camera.
+  [[nodiscard]] std::optional<Linearised> linearise(const Track& track, const Matrix<3>& R,
+                                                    const Vector<3>& baseline) const {
+    const Matrix<3> R_after = motion_.rotation().matrix().transpose();
+    Linearised result;
+    result.J_shared.setZero();
+    for (int moment = 0; moment < 2; ++moment) {
+      Vector<3> p = track.point;
+      Matrix<3> by_point = Matrix<3>::Identity();
+      Matrix<3, 6> by_motion = Matrix<3, 6>::Zero();
+      if (moment == 1) {
+        p = R_after * (p - motion_.translation());
+        by_point = R_after;
+        by_motion << -Matrix<3>::Identity(), skew(p);
+      }
+      const Vector<3> q = R.transpose() * (p - baseline);
+      Matrix<3, 5> by_correction;
+      by_correction << skew(q), -rig_.nominal().baseline() * (R.transpose() * rig_.direction_jacobian());
+      const auto left = whitened(track.views[static_cast<std::size_t>(2 * moment)], p);
+      const auto right = whitened(track.views[static_cast<std::size_t>(2 * moment + 1)], q);
+      if (!left || !right) return std::nullopt;
+      const int row = 4 * moment;
+      result.residual.segment<2>(row) = left->first;
+      result.residual.segment<2>(row + 2) = right->first;
+      result.J_point.middleRows<2>(row) = left->second * by_point;
+      result.J_point.middleRows<2>(row + 2) = right->second * R.transpose() * by_point;
+      result.J_shared.block<2, 6>(row, 0) = left->second * by_motion;
+      result.J_shared.block<2, 6>(row + 2, 0) = right->second * R.transpose() * by_motion;
+      result.J_shared.block<2, 5>(row + 2, 6) = right->second * by_correction;
+    }
+    return result;
+  }
+
+  /// Residual of a view and d predicted / d point, both whitened.
+  [[nodiscard]] static std::optional<std::pair<Vector<2>, Matrix<2, 3>>> whitened(const View& view,
+                                                                                  const Vector<3>& p) {
+    if (!(p(2) > 1e-6)) return std::nullopt;
+    const double x = p(0) / p(2), y = p(1) / p(2);
+    Matrix<2, 3> J;
+    J << 1 / p(2), 0, -x / p(2), 0, 1 / p(2), -y / p(2);
+    return std::pair<Vector<2>, Matrix<2, 3>>(view.whitening * (view.observed - Vector<2>(x, y)),
+                                              view.whitening * J);
+  }
+
+  /// Normal equations of motion and correction with the points eliminated.
+  void gather(const Vector<5>& mean, const Matrix<5>& information, double gate, double loss_scale,
+              Matrix<shared>& H, Vector<shared>& g) {
+    H.setZero();
+    g.setZero();
+    H.bottomRightCorner<5, 5>() = information;
+    g.tail<5>() = information * (mean - state_);
+    const Matrix<3> R = rig_.rotation(state_).matrix();
+    const Vector<3> baseline = rig_.nominal().baseline() * rig_.direction(state_);
+    for (Track& track : tracks_) {
+      track.coupling.setZero();
+      track.gradient.setZero();
+      track.chi_squared = std::numeric_limits<double>::infinity();
+      const auto at = linearise(track, R, baseline);
+      if (!at) continue;
+      const Matrix<3> own = at->J_point.transpose() * at->J_point;
+      const Eigen::LLT<Matrix<3>> elimination(own);
+      if (elimination.info() != Eigen::Success) continue;
+      track.elimination = elimination;
+      track.coupling = at->J_point.transpose() * at->J_shared;
+      track.gradient = at->J_point.transpose() * at->residual;
+      const Vector<3> eliminated = elimination.solve(track.gradient);
+      track.chi_squared = at->residual.squaredNorm() - track.gradient.dot(eliminated);
+      if (!(track.chi_squared < gate)) continue;
+      const double weight = robust_weight(RobustLoss::cauchy, loss_scale, track.chi_squared);
+      H += weight * (at->J_shared.transpose() * at->J_shared -
+                     track.coupling.transpose() * elimination.solve(track.coupling));
+      g += weight * (at->J_shared.transpose() * at->residual - track.coupling.transpose() * eliminated);
+    }
+  }
+
+  const RigCorrection& rig_;
+  Vector<5> state_;
+  SE3 motion_;
+  std::vector<Track> tracks_;
+};
+
+}  // namespace detail
+
+/// Correction of the rig by one motion, given what is known of the correction beforehand: its mean `state`
+/// and positive definite `covariance`. `guess` is about the motion (within some tens of pixels). Points that
+/// cannot be triangulated or do not move with the others are left out. A motion with little parallax says
+/// little, and the covariance stays near the prior's. O(points) for each step; deterministic.
+[[nodiscard]] inline MotionCalibration calibrate_from_motion(const RigCorrection& rig, const Vector<5>& state,
+                                                             const Matrix<5>& covariance,
+                                                             std::span<const MovedPair> pairs,
+                                                             const SE3& guess,
+                                                             const MotionCalibrationOptions& options = {}) {
+  MotionCalibration result{state, covariance, guess};
+  const Eigen::LLT<Matrix<5>> prior(covariance);
+  CAIRN_EXPECTS(state.allFinite() && covariance.allFinite() && prior.info() == Eigen::Success,
+                "calibrate_from_motion: expected a finite state and a positive definite covariance");
+  const Matrix<5> information = symmetrised(Matrix<5>(prior.solve(Matrix<5>::Identity())));
+  detail::MotionCalibrationProblem problem(rig, state, guess, pairs);
+  if (problem.size() < options.min_inliers) return result;
+  const double gate = chi_square_quantile(options.gate_probability, 5);
+  result.status = MotionCalibrationStatus::degenerate;
+  double widening = 30;  // of all sigmas: the guess may be pixels away; narrows to 1
+  for (int i = 0; i < options.max_steps; ++i) {
+    const auto length =
+        problem.step(state, information, gate * widening * widening, options.loss_scale * widening);
+    if (!length) return result;
+    if (widening == 1 && *length < 1e-6) break;
+    widening = std::max(1.0, widening / 4);
+  }
+  const double efficiency =
+      detail::robust_efficiency(RobustLoss::cauchy, options.loss_scale, options.gate_probability, gate, 5);
+  const auto posterior = problem.covariance(information, gate, efficiency);
+  if (!posterior || !problem.state().allFinite()) return result;
+  result.inliers = problem.inside(gate);
+  result.status = MotionCalibrationStatus::no_consensus;
+  if (!detail::enough_inliers(result.inliers, problem.size(), options)) return result;
+  result.status = MotionCalibrationStatus::good;
+  result.state = problem.state();
+  result.covariance = *posterior;
+  result.T_before_after = problem.motion();
+  return result;
+}
+
+}  // namespace cairn::inline CAIRN_ABI
