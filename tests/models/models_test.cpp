@@ -58,7 +58,8 @@ TEST_SUITE("models") {
     const Matrix<n> whole = process.jacobian(x, NoControl{}, 0.5);
     CHECK((half * half - whole).norm() < 1e-15);
     const Matrix<n> q = process.noise(x, NoControl{}, 0.25);
-    CHECK((half * q * half.transpose() + q - process.noise(x, NoControl{}, 0.5)).norm() < 1e-15);
+    const Matrix<n> whole_q = process.noise(x, NoControl{}, 0.5);
+    CHECK((half * q * half.transpose() + q - whole_q).norm() < 1e-15);
     CHECK((process.propagate(x, NoControl{}, 0.5) - whole * x).norm() < 1e-15);
   }
   TEST_CASE("constant velocity and acceleration: two half steps are a whole one, noise included") {

@@ -18,6 +18,8 @@
 #include <limits>
 
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/correction.hpp>
+#include <cairn/filter/elimination.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kernels.hpp>
 #include <cairn/filter/status.hpp>
@@ -30,12 +32,28 @@ enum class Form { standard, joseph, sequential };
 
 namespace detail {
 
-/// Result of an update before anyone decides to keep it.
+/// Result of an update before anyone decides to keep it. Of fixed size, it stays in columns: a copy through a
+/// matrix would be stored and loaded in different pieces (column.hpp).
 template <int N, int M, class S>
 struct Candidate {
   Innovation<M, S> innovation;
+  Column<N, S> step;
+  Column<N, S> covariance[static_cast<std::size_t>(N)];
+
+  void step_to(Vector<N, S>& to) const { step.store(to.data()); }
+  void covariance_to(Matrix<N, N, S>& to) const {
+    each<N>([&](int j) { covariance[j].store(to.data() + j * N); });
+  }
+};
+template <int N, int M, class S>
+  requires(N == dynamic || M == dynamic)
+struct Candidate<N, M, S> {
+  Innovation<M, S> innovation;
   Vector<N, S> step;
   Matrix<N, N, S> covariance;
+
+  void step_to(Vector<N, S>& to) const { to = step; }
+  void covariance_to(Matrix<N, N, S>& to) const { to = covariance; }
 };
 
 template <int M, class S>
@@ -76,15 +94,16 @@ template <int N, int M, class S, class H>
 /// One number at a time: z_j = h_j x + noise of variance d_j, after L^-1 with R = L diag(d) L^T.
 template <int N, int M, class S, class H>
 [[nodiscard, gnu::noinline]] bool sequential(const H& h, const Matrix<M, M, S>& r,
-                                             const Vector<M, S>& residual, Matrix<N, N, S>& p,
-                                             Vector<N, S>& step, S& nis) {
+                                             const Vector<M, S>& residual, const Matrix<N, N, S>& prior,
+                                             Column<N, S> (&lowered)[N], Column<N, S>& moved, S& nis) {
   using std::sqrt;
   S lower[M][M];
   S inverse_root[M];
   if (!factor(r, lower, inverse_root)) return false;
   Matrix<M, N, S> rows = dense_of(h);
   Vector<M, S> left = residual;
-  step.setZero();
+  Matrix<N, N, S> p = prior;
+  Vector<N, S> step = Vector<N, S>::Zero();
   nis = S(0);
   for (int j = 0; j < M; ++j) {
     for (int k = 0; k < j; ++k) {
@@ -100,6 +119,8 @@ template <int N, int M, class S, class H>
     step += ph * (error / variance);
     nis += error * error / variance;
   }
+  load_columns(p, lowered);
+  moved.load(step.data());
   return true;
 }
 
@@ -112,40 +133,35 @@ template <int N, class S>
     good = good && updated(i, i) >= least * prior(i, i);
   return good;
 }
+template <int N, class S>
+[[gnu::always_inline]] [[nodiscard]] inline bool keeps_digits(const Column<N, S> (&updated)[N],
+                                                              const Matrix<N, N, S>& prior) {
+  constexpr S least = S(4) * std::numeric_limits<S>::epsilon();
+  bool good = true;
+  each<N>([&](int i) { good = good && updated[i][i] >= least * prior(i, i); });
+  return good;
+}
 
 /// The update for sizes known at compile time.
 template <int N, int M, class S, class H>
   requires(N != dynamic && M != dynamic)
-inline void correct_into(Candidate<N, M, S>& out, const Matrix<N, N, S>& prior, const H& h,
-                         const Matrix<M, M, S>& r, double gate, Form form) {
+[[gnu::always_inline]] inline void correct_into(Candidate<N, M, S>& out, const Matrix<N, N, S>& prior,
+                                                const H& h, const Matrix<M, M, S>& r, double gate,
+                                                Form form) {
   Innovation<M, S>& in = out.innovation;
-  Column<N, S> p[N];
-  for (int j = 0; j < N; ++j) p[j].load(prior.data() + j * N);
+  Column<N, S>(&p)[N] = out.covariance;
+  load_columns(prior, p);
   Correction<N, M, S> c;
   bool good = correction(p, h, r, in.covariance, c);
-  S y[M];
-  c.whiten(in.residual.data(), y);
-  in.nis = S(0);
-  Column<N, S> step;
-  step.set_zero();
-  for (int m = 0; m < M; ++m) {
-    in.nis += y[m] * y[m];
-    step.add(c.w[m], y[m]);
-  }
-  good = good && in.nis <= static_cast<S>(gate) && in.nis <= std::numeric_limits<S>::max();
-  if (good && form == Form::standard) [[likely]] {
-    step.store(out.step.data());
+  in.nis = c.take(in.residual.data(), out.step);
+  good = good && gate > 0.0 && in.nis <= static_cast<S>(gate) && in.nis <= std::numeric_limits<S>::max();
+  if (form == Form::standard) [[likely]]
     lower_by_squares(p, c.w);
-    for (int j = 0; j < N; ++j) p[j].store(out.covariance.data() + j * N);
-  } else if (good && form == Form::joseph) {
-    step.store(out.step.data());
-    out.covariance = joseph<N, M, S>(prior, h, r, c);
-  } else if (good) {
-    out.covariance = prior;
-    good = sequential<N, M, S>(h, r, in.residual, out.covariance, out.step, in.nis);
-  }
-  good = good && gate > 0.0 && (form == Form::joseph || keeps_digits<N, S>(out.covariance, prior)) &&
-         is_covariance<N, S>(out.covariance);
+  else if (good && form == Form::joseph)
+    load_columns(joseph<N, M, S>(prior, h, r, c), p);
+  else if (good)
+    good = sequential<N, M, S>(h, r, in.residual, prior, p, out.step, in.nis);
+  good = good && (form == Form::joseph || keeps_digits<N, S>(p, prior)) && is_covariance(p);
   if (!good) [[unlikely]]
     in.status = diagnose<M, S>(in, prior, gate);
 }
@@ -187,8 +203,10 @@ void correct_into(Candidate<N, M, S>& out, const Matrix<N, N, S>& prior, const M
 
 /// Runs the update and keeps it in the belief if everything about it is sound.
 template <Manifold X, int M, class H>
-inline Innovation<M, ScalarOf<X>> correct(Gaussian<X>& belief, const H& h, const Matrix<M, M, ScalarOf<X>>& r,
-                                          const Vector<M, ScalarOf<X>>& residual, double gate, Form form) {
+[[gnu::always_inline]] inline Innovation<M, ScalarOf<X>> correct(Gaussian<X>& belief, const H& h,
+                                                                 const Matrix<M, M, ScalarOf<X>>& r,
+                                                                 const Vector<M, ScalarOf<X>>& residual,
+                                                                 double gate, Form form) {
   using S = ScalarOf<X>;
   constexpr int n = dof<X>;
   Candidate<n, M, S> candidate{fresh_innovation<M, S>(residual, r), {}, {}};
@@ -196,11 +214,13 @@ inline Innovation<M, ScalarOf<X>> correct(Gaussian<X>& belief, const H& h, const
     correct_into<n, M, S>(candidate, belief.covariance, dense_of(h), r, gate, form);
   else
     correct_into<n, M, S>(candidate, belief.covariance, h, r, gate, form);
-  if (candidate.innovation.status == Status::accepted && !finite_state(belief.mean)) [[unlikely]]
-    candidate.innovation.status = Status::not_finite;
+  if (!finite_state(belief.mean)) [[unlikely]]
+    if (candidate.innovation.status == Status::accepted) candidate.innovation.status = Status::not_finite;
   if (candidate.innovation.status == Status::accepted) [[likely]] {
-    belief.mean = manifold_traits<X>::retract(belief.mean, candidate.step);
-    belief.covariance = candidate.covariance;
+    Tangent<X> step;
+    candidate.step_to(step);
+    belief.mean = manifold_traits<X>::retract(belief.mean, step);
+    candidate.covariance_to(belief.covariance);
   }
   return candidate.innovation;
 }
@@ -215,33 +235,74 @@ template <Manifold X>
   return is_valid_covariance<dof<X>, S>(q) ? Status::accepted : Status::not_positive_definite;
 }
 
+/// Finite, with no variance below zero. One pass: a NaN or infinity anywhere makes the sum NaN.
+template <int N, class S>
+[[gnu::always_inline]] [[nodiscard]] inline bool finite_variances(const Column<N, S> (&p)[N]) {
+  typename Column<N, S>::Lane none = p[0].lanes[0] * S(0);
+  bool good = p[0][0] >= S(0);
+  each<N>([&](int j) {
+    each<Column<N, S>::count>([&](int k) { none += p[j].lanes[k] * S(0); });
+    good = good && p[j][j] >= S(0);
+  });
+  if constexpr (Column<N, S>::width == 1) {
+    return good && none == S(0);
+  } else {
+    S sum(0);
+    for (int k = 0; k < Column<N, S>::width; ++k) sum += none[k];
+    return good && sum == S(0);
+  }
+}
+
+/// Why a prediction that went wrong went wrong. Off the hot path.
+template <Manifold X, int N, class S>
+[[nodiscard, gnu::cold, gnu::noinline]] Status diagnose_prediction(const Column<N, S> (&p)[N],
+                                                                   const X& mean) {
+  bool good = finite_state(mean);
+  for (int j = 0; j < N; ++j)
+    for (int i = 0; i < N; ++i) good = good && finite(p[j][i]);
+  return good ? Status::not_positive_definite : Status::not_finite;
+}
+
 /// The covariance part of a prediction: fading * F P F^T + Q + extra I, kept with the mean if both are sound.
-template <Manifold X, class F>
-inline Status advance(Gaussian<X>& belief, const X& mean, const F& f, const CovarianceOf<X>& q, double fading,
-                      double extra) {
+template <Manifold X, class F, class Q>
+  requires(dof<X> != dynamic)
+[[gnu::always_inline]] inline Status advance(Gaussian<X>& belief, const X& mean, const F& f, const Q& q,
+                                             double fading, double extra) {
   using S = ScalarOf<X>;
   constexpr int n = dof<X>;
-  CovarianceOf<X> next;
-  if constexpr (n == dynamic) {
-    if (f.rows() != belief.covariance.rows() || f.cols() != f.rows() || q.rows() != f.rows() ||
-        q.cols() != f.rows())
-      return Status::size_mismatch;
-    next = static_cast<S>(fading) * f * belief.covariance * f.transpose();
-    next = symmetrised(next + q);
-  } else if (fading == 1.0) [[likely]] {
-    next = congruence(f, belief.covariance, q);
-  } else {
-    next = congruence(f, belief.covariance, Matrix<n, n, S>::Zero().eval()) * static_cast<S>(fading) + q;
-    mirror_lower<n, S>(next);
-  }
+  Column<n, S> p[n];
+  Column<n, S> next[n];
+  load_columns(belief.covariance, p);
+  if (fading != 1.0) [[unlikely]]
+    each<n>([&](int j) { p[j].scale(static_cast<S>(fading)); });
+  congruence(f, p, q, next);
   if (extra > 0.0) [[unlikely]]
-    for (int i = 0; i < static_cast<int>(next.rows()); ++i) next(i, i) += static_cast<S>(extra);
+    add_to_diagonal(next, static_cast<S>(extra));
+  if (!finite_variances(next) || !finite_state(mean)) [[unlikely]]
+    return diagnose_prediction(next, mean);
+  belief.mean = mean;
+  each<n>([&](int j) { next[j].store(belief.covariance.data() + j * n); });
+  return Status::accepted;
+}
+
+/// The same for sizes known at run time.
+template <Manifold X, class F>
+  requires(dof<X> == dynamic)
+Status advance(Gaussian<X>& belief, const X& mean, const F& f, const CovarianceOf<X>& q, double fading,
+               double extra) {
+  using S = ScalarOf<X>;
+  if (f.rows() != belief.covariance.rows() || f.cols() != f.rows() || q.rows() != f.rows() ||
+      q.cols() != f.rows())
+    return Status::size_mismatch;
+  CovarianceOf<X> next = static_cast<S>(fading) * f * belief.covariance * f.transpose();
+  next = symmetrised(next + q);
   bool positive = true;
-  for (int i = 0; i < static_cast<int>(next.rows()); ++i) positive = positive && next(i, i) >= S(0);
-  if (!all_finite(next) || !finite_state(mean)) [[unlikely]]
-    return Status::not_finite;
-  if (!positive) [[unlikely]]
-    return Status::not_positive_definite;
+  for (int i = 0; i < static_cast<int>(next.rows()); ++i) {
+    next(i, i) += static_cast<S>(extra);
+    positive = positive && next(i, i) >= S(0);
+  }
+  if (!all_finite(next) || !finite_state(mean)) return Status::not_finite;
+  if (!positive) return Status::not_positive_definite;
   belief.mean = mean;
   belief.covariance = next;
   return Status::accepted;

@@ -58,11 +58,12 @@ struct Extended {
     constexpr int m = dof<typename H::Measurement>;
     const auto residual = local(typename H::Measurement(sensor.predict(belief.mean)), z);
     if (iterations == 1) [[likely]]
-      return detail::correct<X, m>(belief, sensor.jacobian(belief.mean), sensor.noise(belief.mean), residual,
-                                   gate, form);
+      return detail::correct<X, m>(belief, sensor.jacobian(belief.mean),
+                                   detail::dense_of(sensor.noise(belief.mean)), residual, gate, form);
     Gaussian<X> first = belief;
-    auto innovation = detail::correct<X, m>(first, sensor.jacobian(belief.mean), sensor.noise(belief.mean),
-                                            residual, gate, form);
+    auto innovation =
+        detail::correct<X, m>(first, sensor.jacobian(belief.mean),
+                              detail::dense_of(sensor.noise(belief.mean)), residual, gate, form);
     if (iterations < 1) innovation.status = Status::bad_option;
     if (innovation.accepted()) innovation.status = iterate(belief, sensor, z);
     return innovation;
@@ -119,11 +120,13 @@ Status Extended::iterate(Gaussian<typename H::State>& belief, const H& sensor,
     Vector<m, S> residual = local(typename H::Measurement(sensor.predict(x)), z);
     residual += h * e;
     const Matrix<m, m, S> noise = sensor.noise(x);
-    detail::Candidate<n, m, S> next{detail::fresh_innovation<m, S>(residual, noise), e, covariance};
+    detail::Candidate<n, m, S> next{detail::fresh_innovation<m, S>(residual, noise), {}, {}};
     detail::correct_into<n, m, S>(next, belief.covariance, h, noise, no_gate, form);
     if (next.innovation.status != Status::accepted) return next.innovation.status;
-    covariance = next.covariance;
-    Tangent<X> change = next.step - e;
+    next.covariance_to(covariance);
+    Tangent<X> change = e;
+    next.step_to(change);
+    change -= e;
     S lower = detail::posterior_cost(belief, Tangent<X>(e + change), sensor, z);
     for (int halving = 0; halving < 10 && !(lower <= cost); ++halving) {
       change *= S(0.5);

@@ -12,6 +12,7 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/random.hpp>
+#include <cairn/filter/elimination.hpp>
 #include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/manifold/manifold.hpp>

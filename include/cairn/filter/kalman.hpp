@@ -53,7 +53,7 @@ struct Kalman {
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
       Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
     return detail::correct<typename H::State, dof<typename H::Measurement>>(
-        belief, sensor.jacobian(belief.mean), sensor.noise(belief.mean),
+        belief, sensor.jacobian(belief.mean), detail::dense_of(sensor.noise(belief.mean)),
         local(typename H::Measurement(sensor.predict(belief.mean)), z), gate, form);
   }
 };

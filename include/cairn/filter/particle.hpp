@@ -268,7 +268,7 @@ struct ParticleFilter {
     for (std::size_t i = 0; i < belief.size(); ++i) {
       Innovation<m, S> in;
       in.residual = local(Z(sensor.predict(belief.states[i])), z);
-      in.covariance = sensor.noise(belief.states[i]);
+      in.covariance = detail::dense_of(sensor.noise(belief.states[i]));
       in.nis = detail::squared_mahalanobis<m, S>(in.residual, in.covariance);
       log_likelihoods[i] = static_cast<double>(in.log_likelihood());
     }

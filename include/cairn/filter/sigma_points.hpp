@@ -18,13 +18,12 @@
 #pragma once
 
 #include <cmath>
-#include <cstddef>
-#include <limits>
 #include <type_traits>
 
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kernels.hpp>
+#include <cairn/filter/sigma_sums.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn::inline CAIRN_ABI {
@@ -49,94 +48,45 @@ struct Transformed {
   Matrix<N, dof<Y>, ScalarOf<Y>> cross;
 };
 
-/// Parts of `even` that rounding alone explains become zero.
-template <Manifold Y>
-void drop_noise(const Y& center, const Tangent<Y>& odd, Tangent<Y>& even) {
-  using std::abs;
-  using S = ScalarOf<Y>;
-  constexpr S ulps = S(4) * std::numeric_limits<S>::epsilon();
-  for (int i = 0; i < static_cast<int>(even.size()); ++i) {
-    S size = S(1);
-    if constexpr (is_vector<Y>) size = abs(center(i));
-    if (abs(even(i)) <= ulps * (size + abs(odd(i)))) even(i) = S(0);
-  }
-}
-
-/// Sums of (2) and (3), kept in columns; scaled once at the end, so that they stay symmetric bit for bit.
-template <int N, int M, class S>
-class MomentSums {
-public:
-  MomentSums(int, int) {
-    for (int b = 0; b < M; ++b) {
-      squares_[b].set_zero();
-      cross_[b].set_zero();
-    }
-  }
-  [[gnu::always_inline]] void add(const S* root_column, const Vector<M, S>& odd, const Vector<M, S>& even) {
-    Column<M, S> o, e;
-    Column<N, S> l;
-    o.load(odd.data());
-    e.load(even.data());
-    l.load(root_column);
-    for (int b = 0; b < M; ++b) {
-      squares_[b].add(o, odd(b));
-      squares_[b].add(e, even(b));
-      cross_[b].add(l, odd(b));
-    }
-  }
-  void finish(const S& w, const S& extra, const S& inverse_c, const Vector<M, S>& mean,
-              Matrix<M, M, S>& covariance, Matrix<N, M, S>& cross) {
-    for (int b = 0; b < M; ++b) {
-      squares_[b].scale(w);
-      squares_[b].store(covariance.data() + b * M);
-      for (int a = 0; a < M; ++a) covariance(a, b) += extra * (mean(a) * mean(b));
-      cross_[b].scale(inverse_c);
-      cross_[b].store(cross.data() + b * N);
-    }
-  }
-
-private:
-  Column<M, S> squares_[static_cast<std::size_t>(M)];
-  Column<N, S> cross_[static_cast<std::size_t>(M)];
-};
-
-/// The same for sizes known at run time.
-template <int N, int M, class S>
-  requires(N == dynamic || M == dynamic)
-class MomentSums<N, M, S> {
-public:
-  MomentSums(int n, int m) : squares_(Matrix<M, M, S>::Zero(m, m)), cross_(Matrix<N, M, S>::Zero(n, m)) {}
-  void add(const S* root_column, const Vector<M, S>& odd, const Vector<M, S>& even) {
-    squares_ += odd * odd.transpose() + even * even.transpose();
-    cross_ += Eigen::Map<const Vector<N, S>>(root_column, cross_.rows()) * odd.transpose();
-  }
-  void finish(const S& w, const S& extra, const S& inverse_c, const Vector<M, S>& mean,
-              Matrix<M, M, S>& covariance, Matrix<N, M, S>& cross) {
-    covariance = w * squares_ + extra * (mean * mean.transpose());
-    cross = inverse_c * cross_;
-  }
-
-private:
-  Matrix<M, M, S> squares_;
-  Matrix<N, M, S> cross_;
-};
-
 /// Carries the points of N(x, root root^T) through f. `c2` is the spread squared.
 template <Manifold X, class F>
+  requires(dof<X> != dynamic)
 [[nodiscard]] auto unscented_transform(const X& x, const CovarianceOf<X>& root, const F& f, double c2,
                                        double beta_minus_alpha2) {
   using S = ScalarOf<X>;
   using Y = std::decay_t<decltype(f(x))>;
-  using std::sqrt;
+  constexpr int n = dof<X>, m = dof<Y>;
+  Column<n, S> l[n];
+  load_columns(root, l);
+  Y center = f(x);
+  const Moments<n, m, S> moments =
+      sum_points<Pairs::with_cross>(x, l, f, spread<S>(c2), beta_minus_alpha2, center);
+  Transformed<Y, n> out{center, {}, {}};
+  Tangent<Y> mean;
+  moments.mean.store(mean.data());
+  out.mean = retract(center, mean);
+  each<m>([&](int b) {
+    moments.covariance[b].store(out.covariance.data() + b * m);
+    moments.cross[b].store(out.cross.data() + b * n);
+  });
+  return out;
+}
+
+/// The same for sizes known at run time.
+template <Manifold X, class F>
+  requires(dof<X> == dynamic)
+[[nodiscard]] auto unscented_transform(const X& x, const CovarianceOf<X>& root, const F& f, double c2,
+                                       double beta_minus_alpha2) {
+  using S = ScalarOf<X>;
+  using Y = std::decay_t<decltype(f(x))>;
   const int n = static_cast<int>(root.cols());
-  const S nearest = sqrt(sqrt(std::numeric_limits<S>::epsilon()));
-  const S c = sqrt(static_cast<S>(c2)) > nearest ? sqrt(static_cast<S>(c2)) : nearest;
+  const S c = spread<S>(c2);
   const S w = S(1) / (c * c);
   const Y center = f(x);
   const int m = dof_of(center);
   Tangent<Y> mean = Tangent<Y>::Zero(m);
-  Transformed<Y, dof<X>> out{center, CovarianceOf<Y>::Zero(m, m), Matrix<dof<X>, dof<Y>, S>::Zero(n, m)};
-  MomentSums<dof<X>, dof<Y>, S> sums(n, m);
+  CovarianceOf<Y> squares = CovarianceOf<Y>::Zero(m, m);
+  Matrix<dof<X>, dof<Y>, S> cross = Matrix<dof<X>, dof<Y>, S>::Zero(n, m);
   for (int i = 0; i < n; ++i) {
     const Tangent<X> step = c * root.col(i);
     const Tangent<Y> up = local(center, Y(f(retract(x, step))));
@@ -145,11 +95,12 @@ template <Manifold X, class F>
     Tangent<Y> even = S(0.5) * (up + down);
     drop_noise<Y>(center, odd, even);
     mean += even;
-    sums.add(root.data() + i * n, odd, even);
+    squares += odd * odd.transpose() + even * even.transpose();
+    cross += root.col(i) * odd.transpose();
   }
   mean *= w;
-  sums.finish(w, static_cast<S>(beta_minus_alpha2), S(1) / c, mean, out.covariance, out.cross);
-  out.mean = retract(center, mean);
+  Transformed<Y, dof<X>> out{retract(center, mean), CovarianceOf<Y>::Zero(m, m), cross / c};
+  out.covariance = w * squares + static_cast<S>(beta_minus_alpha2) * (mean * mean.transpose());
   return out;
 }
 

@@ -92,6 +92,15 @@ consteval auto selection_pattern() {
   return pattern;
 }
 
+template <int N>
+consteval auto diagonal_pattern() {
+  Pattern<static_cast<std::size_t>(N) * (N + 1)> pattern;
+  for (int i = 0; i < N; ++i)
+    for (int j = 0; j <= N; ++j) pattern.text[i * (N + 1) + j] = j == N ? ' ' : (j == i ? '*' : '.');
+  pattern.text[N * (N + 1) - 1] = '\0';
+  return pattern;
+}
+
 template <std::size_t... I>
 consteval auto identity_pattern(std::index_sequence<I...>) {
   return selection_pattern<static_cast<int>(sizeof...(I)), static_cast<int>(I)...>();
@@ -131,6 +140,18 @@ struct Structured {
       return values[static_cast<std::size_t>(entries[E].slot)];
   }
 
+  /// A x, without the zeros.
+  [[nodiscard]] Vector<row_count, S> operator*(const Vector<column_count, S>& x) const {
+    Vector<row_count, S> y = Vector<row_count, S>::Zero();
+    detail::unrolled<entries.size()>([&](auto e) __attribute__((always_inline)) {
+      if constexpr (entries[e].slot < 0)
+        y(entries[e].row) += x(entries[e].column);
+      else
+        y(entries[e].row) += this->template value<e>() * x(entries[e].column);
+    });
+    return y;
+  }
+
   [[nodiscard]] Dense dense() const {
     Dense result = Dense::Zero();
     detail::unrolled<entries.size()>(
@@ -144,6 +165,10 @@ struct Structured {
 /// The N x N identity, known at compile time.
 template <int N, class S = double>
 using Identity = Structured<detail::identity_pattern(std::make_index_sequence<N>{}), S>;
+
+/// A diagonal N x N matrix, as noise often is: Diagonal<3>{{0.1, 0.1, 0.02}}.
+template <int N, class S = double>
+using Diagonal = Structured<detail::diagonal_pattern<N>(), S>;
 
 /// Rows `Chosen` of the N x N identity: a sensor that sees those states.
 template <int N, int... Chosen>
@@ -163,6 +188,16 @@ template <Pattern P, class S>
 inline constexpr bool is_identity<Structured<P, S>> = [] {
   bool good = P.rows() == P.columns() && P.count('*') == 0 && P.count('1') == P.rows();
   for (int i = 0; good && i < P.rows(); ++i) good = P.at(i, i) == '1';
+  return good;
+}();
+
+/// Nothing off the diagonal, and every number of the diagonal given.
+template <class T>
+inline constexpr bool is_diagonal = false;
+template <Pattern P, class S>
+inline constexpr bool is_diagonal<Structured<P, S>> = [] {
+  bool good = P.rows() == P.columns() && P.count('1') == 0 && P.count('*') == P.rows();
+  for (int i = 0; good && i < P.rows(); ++i) good = P.at(i, i) == '*';
   return good;
 }();
 

@@ -13,6 +13,7 @@
 #include <cmath>
 #include <concepts>
 #include <limits>
+#include <type_traits>
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
@@ -21,6 +22,7 @@
 #include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/status.hpp>
+#include <cairn/filter/ud_kernels.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn::inline CAIRN_ABI {
@@ -44,96 +46,6 @@ struct UDGaussian {
   [[nodiscard]] Gaussian<X> gaussian() const { return {mean, covariance()}; }
 };
 
-namespace detail {
-
-/// a = U diag(d) U^T for a symmetric positive semi-definite a, from the last column on. False where a pivot
-/// is negative beyond rounding, or not finite.
-template <int N, class S>
-[[nodiscard]] bool ud_factor(const Matrix<N, N, S>& a, Matrix<N, N, S>& u, Vector<N, S>& d) {
-  constexpr S slack = S(64) * std::numeric_limits<S>::epsilon();
-  Column<N, S> columns[N];
-  for (int j = 0; j < N; ++j) columns[j].load(a.data() + j * N);
-  u.setIdentity();
-  for (int j = N - 1; j >= 0; --j) {
-    const S pivot = columns[j][j];
-    const bool regular = pivot > slack * a(j, j);
-    if (!regular && !(pivot >= -slack * a(j, j) && a(j, j) < std::numeric_limits<S>::infinity()))
-      return false;
-    d(j) = regular ? pivot : S(0);
-    if (!regular) continue;
-    const S inverse = S(1) / pivot;
-    for (int i = 0; i < j; ++i) {
-      u(i, j) = columns[j][i] * inverse;
-      columns[i].subtract(columns[j], u(i, j));
-    }
-  }
-  return true;
-}
-
-template <int K, class S>
-[[gnu::always_inline]] inline S dot(const Column<K, S>& a, const Column<K, S>& b) {
-  typename Column<K, S>::Lane sum = a.lanes[0] * b.lanes[0];
-  for (int k = 1; k < Column<K, S>::count; ++k) sum += a.lanes[k] * b.lanes[k];
-  if constexpr (Column<K, S>::width == 1) {
-    return sum;
-  } else {
-    S total(0);
-    for (int k = 0; k < Column<K, S>::width; ++k) total += sum[k];
-    return total;
-  }
-}
-
-/// Rows w and weights d become U and D with U D U^T = sum d_k w_k w_k^T (Thornton).
-template <int N, int K, class S>
-void weighted_gram_schmidt(Column<K, S> (&rows)[N], const Column<K, S>& weights, Matrix<N, N, S>& u,
-                           Vector<N, S>& d) {
-  u.setIdentity();
-  for (int j = N - 1; j >= 0; --j) {
-    Column<K, S> weighted = rows[j];
-    for (int k = 0; k < Column<K, S>::count; ++k) weighted.lanes[k] *= weights.lanes[k];
-    const S length = dot(rows[j], weighted);
-    d(j) = length;
-    if (!(length > S(0))) continue;
-    const S inverse = S(1) / length;
-    for (int i = 0; i < j; ++i) {
-      const S factor = dot(rows[i], weighted) * inverse;
-      u(i, j) = factor;
-      rows[i].subtract(rows[j], factor);
-    }
-  }
-}
-
-/// One scalar measurement with row h and noise variance r (Bierman). gain = P h (unscaled); returns the
-/// innovation variance.
-template <int N, class S>
-[[nodiscard]] S bierman(Matrix<N, N, S>& u, Vector<N, S>& d, const Vector<N, S>& h, const S& r,
-                        Vector<N, S>& gain) {
-  S alpha = r;
-  for (int j = 0; j < N; ++j) {
-    S f = h(j);
-    for (int i = 0; i < j; ++i) f += u(i, j) * h(i);
-    const S v = d(j) * f;
-    const S before = alpha;
-    alpha += f * v;
-    gain(j) = v;
-    if (!(before > S(0))) {  // r = 0 and nothing seen yet: U keeps its column
-      if (alpha > S(0)) d(j) = S(0);
-      for (int i = 0; i < j; ++i) gain(i) += u(i, j) * v;
-      continue;
-    }
-    d(j) *= before / alpha;
-    const S lambda = -f / before;
-    for (int i = 0; i < j; ++i) {
-      const S old = u(i, j);
-      u(i, j) += gain(i) * lambda;
-      gain(i) += old * v;
-    }
-  }
-  return alpha;
-}
-
-}  // namespace detail
-
 template <Manifold X>
 UDGaussian<X> UDGaussian<X>::from(const Gaussian<X>& belief) {
   UDGaussian result{belief.mean, {}, Tangent<X>::Zero()};
@@ -153,33 +65,25 @@ struct UDFilter {
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
     if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
-    CovarianceOf<X> upper_q;
-    Tangent<X> d_q = Tangent<X>::Zero();
-    const CovarianceOf<X> q = process.noise(belief.mean, control, dt);
-    if (!detail::ud_factor<n, S>(q, upper_q, d_q))
-      return detail::all_finite(q) ? Status::not_positive_definite : Status::not_finite;
-    const CovarianceOf<X> fu = product(process.jacobian(belief.mean, control, dt), belief.upper);
-    detail::Column<2 * n, S> rows[n];
-    detail::Column<2 * n, S> weights;
-    S buffer[2 * n];
-    for (int i = 0; i < n; ++i) {
-      for (int k = 0; k < n; ++k) {
-        buffer[k] = fu(i, k);
-        buffer[n + k] = upper_q(i, k);
-      }
-      rows[i].load(buffer);
-    }
-    for (int k = 0; k < n; ++k) {
-      buffer[k] = belief.diagonal(k);
-      buffer[n + k] = d_q(k);
-    }
-    weights.load(buffer);
-    UDGaussian<X> next{process.propagate(belief.mean, control, dt), {}, {}};
-    detail::weighted_gram_schmidt<n, 2 * n, S>(rows, weights, next.upper, next.diagonal);
-    if (!detail::all_finite(next.upper) || !detail::all_finite(next.diagonal) ||
-        !detail::finite_state(next.mean))
+    using Jacobian = std::decay_t<decltype(process.jacobian(belief.mean, control, dt))>;
+    detail::Column<n, S> w[2 * n], u[n], fu[n];
+    S weights[2 * n];
+    const Status noise = factor_noise<n, S>(process.noise(belief.mean, control, dt), w, weights);
+    if (noise != Status::accepted) return noise;
+    detail::load_columns(belief.upper, u);
+    detail::each<n>([&](int j) {
+      fu[j].set_zero();
+      weights[j] = belief.diagonal(j);
+    });
+    detail::add_product<detail::Rows::all>(process.jacobian(belief.mean, control, dt), u, fu);
+    detail::each<n>([&](int j) { w[j] = fu[j]; });
+    const X mean = process.propagate(belief.mean, control, dt);
+    detail::Column<n, S> d;
+    detail::weighted_gram_schmidt<detail::upper_triangular<Jacobian>(), n, S>(w, weights, u, d);
+    if (!finite(u, d) || !detail::finite_state(mean)) [[unlikely]]
       return Status::not_finite;
-    belief = next;
+    belief.mean = mean;
+    keep(belief, u, d);
     return Status::accepted;
   }
   template <LinearisedProcess F>
@@ -196,68 +100,166 @@ struct UDFilter {
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
     constexpr int m = dof<Z>;
-    const Matrix<m, m, S> r = sensor.noise(belief.mean);
-    Matrix<m, n, S> h = detail::dense_of(sensor.jacobian(belief.mean));
-    Vector<m, S> left = local(Z(sensor.predict(belief.mean)), z);
-    Innovation<m, S> in = detail::fresh_innovation<m, S>(left, r);
-    const Matrix<n, m, S> hu = (h * belief.upper).transpose();
-    in.covariance += symmetrised(hu.transpose() * belief.diagonal.asDiagonal() * hu);
-    Matrix<m, m, S> upper_r;
-    Vector<m, S> d_r = Vector<m, S>::Zero();
-    if (!detail::ud_factor<m, S>(r, upper_r, d_r)) {
-      in.status = detail::all_finite(r) ? Status::not_positive_definite : Status::not_finite;
-      return in;
-    }
-    UDGaussian<X> next = belief;
-    Vector<n, S> step = Vector<n, S>::Zero();
-    Vector<n, S> gain;
-    bool regular = true;
-    for (int j = m - 1; j >= 0; --j) {  // U_r^-1 makes the numbers independent, last one first
-      for (int k = j + 1; k < m; ++k) {
-        h.row(j) -= upper_r(j, k) * h.row(k);
-        left(j) -= upper_r(j, k) * left(k);
-      }
-      const Vector<n, S> row = h.row(j).transpose();
-      const S variance = detail::bierman<n, S>(next.upper, next.diagonal, row, d_r(j), gain);
-      regular = regular && variance > S(0);
-      const S error = left(j) - row.dot(step);
-      step += gain * (error / variance);
-      in.nis += error * error / variance;
-    }
-    in.status = verdict(in, regular, next, step);
-    if (in.status == Status::accepted) {
-      next.mean = retract(belief.mean, step);
-      belief = next;
+    const Matrix<m, m, S> r = detail::dense_of(sensor.noise(belief.mean));
+    const auto jacobian = sensor.jacobian(belief.mean);
+    Innovation<m, S> in = detail::fresh_innovation<m, S>(local(Z(sensor.predict(belief.mean)), z), r);
+    detail::Column<n, S> u[n], d, step;
+    detail::load_columns(belief.upper, u);
+    d.load(belief.diagonal.data());
+    step.set_zero();
+    detail::each<n>([&](int j) {  // S += (H u_j) d_j (H u_j)^T
+      S seen[m];
+      detail::each<m>([&](int i) { seen[i] = row_dot(jacobian, i, u[j]); });
+      detail::each<m>([&](int b) {
+        detail::each<m>(b, m, [&](int a) { in.covariance(a, b) += seen[a] * (seen[b] * d[j]); });
+      });
+    });
+    detail::mirror_lower(in.covariance);
+    if (!(gate > 0.0)) in.status = Status::bad_option;
+    bool correlated = false;
+    for (int b = 0; b < m; ++b)
+      for (int a = b + 1; a < m; ++a) correlated = correlated || r(a, b) != S(0);
+    const bool regular = correlated ? take_correlated(in, detail::dense_of(jacobian), r, u, d, step)
+                                    : take(in, jacobian, in.residual, r, u, d, step);
+    if (in.status == Status::accepted) in.status = verdict(in, regular, belief, u, d, step);
+    if (in.status == Status::accepted) [[likely]] {
+      Tangent<X> moved;
+      step.store(moved.data());
+      belief.mean = retract(belief.mean, moved);
+      keep(belief, u, d);
     }
     return in;
   }
 
 private:
-  template <int M, class S, Manifold X>
-  Status verdict(const Innovation<M, S>& in, bool regular, const UDGaussian<X>& next,
-                 const Tangent<X>& step) const {
-    if (!(gate > 0.0)) return Status::bad_option;
-    if (!detail::all_finite(in.residual) || !detail::all_finite(in.covariance) ||
-        !detail::finite_state(next.mean))
-      return Status::not_finite;
-    if (!regular || !detail::all_finite(step) || !detail::all_finite(next.upper) ||
-        !detail::all_finite(next.diagonal))
-      return Status::not_positive_definite;
-    return in.nis <= static_cast<S>(gate) ? Status::accepted : Status::gated;
+  template <int N, class S>
+  using Columns = detail::Column<N, S>[static_cast<std::size_t>(N)];
+
+  /// Row i of H times a column.
+  template <class H, int N, class S>
+  [[gnu::always_inline]] static S row_dot(const H& h, int i, const detail::Column<N, S>& column) {
+    S sum(0);
+    if constexpr (detail::is_structured<H>) {
+      detail::unrolled<H::entries.size()>([&](auto e) __attribute__((always_inline)) {
+        if (H::entries[e].row == i) sum += h.template value<e>() * column[H::entries[e].column];
+      });
+    } else {
+      for (int k = 0; k < N; ++k) sum += h(i, k) * column[k];
+    }
+    return sum;
   }
 
-  template <class A, int N, class S>
-  [[nodiscard]] static Matrix<N, N, S> product(const A& f, const Matrix<N, N, S>& u) {
-    if constexpr (detail::is_structured<A>) {
-      Matrix<N, N, S> fu = Matrix<N, N, S>::Zero();
-      detail::unrolled<A::entries.size()>([&](auto e) {
-        constexpr detail::Entry entry = A::entries[e];
-        for (int k = entry.column; k < N; ++k) fu(entry.row, k) += f.template value<e>() * u(entry.column, k);
-      });
-      return fu;
-    } else {
-      return f * u;
+  /// Takes the numbers of a measurement one after the other; their noises are independent.
+  template <class H, int N, int M, class S>
+  [[gnu::always_inline]] static bool take(Innovation<M, S>& in, const H& h, const Vector<M, S>& residual,
+                                          const Matrix<M, M, S>& r, Columns<N, S>& u, detail::Column<N, S>& d,
+                                          detail::Column<N, S>& step) {
+    bool regular = true;
+    detail::each<M>([&](int i) {
+      S products[N];
+      detail::each<N>([&](int j) { products[j] = row_dot(h, i, u[j]); });
+      detail::Column<N, S> f, gain;
+      f.gather(products);
+      const S variance = r(i, i) > S(0) ? detail::bierman<N, S>(u, d, f, r(i, i), gain)
+                                        : detail::bierman_without_noise<N, S>(u, d, f, r(i, i), gain);
+      regular = regular && r(i, i) >= S(0) && variance > S(0);
+      const S error = residual(i) - row_dot(h, i, step);
+      const S scaled = error / variance;
+      step.add(gain, scaled);
+      in.nis += error * scaled;
+    });
+    return regular;
+  }
+
+  /// Correlated noise: R = U_r D_r U_r^T, and U_r^-1 makes the numbers independent, last one first.
+  template <int N, int M, class S>
+  [[gnu::noinline]] static bool take_correlated(Innovation<M, S>& in, Matrix<M, N, S> h,
+                                                const Matrix<M, M, S>& r, Columns<N, S>& u,
+                                                detail::Column<N, S>& d, detail::Column<N, S>& step) {
+    Matrix<M, M, S> upper_r, diagonal_r = Matrix<M, M, S>::Zero();
+    Vector<M, S> d_r = Vector<M, S>::Zero();
+    Vector<M, S> left = in.residual;
+    if (!detail::ud_factor<M, S>(r, upper_r, d_r)) {
+      in.status = detail::all_finite(r) ? Status::not_positive_definite : Status::not_finite;
+      return false;
     }
+    for (int j = M - 1; j >= 0; --j)
+      for (int k = j + 1; k < M; ++k) {
+        h.row(j) -= upper_r(j, k) * h.row(k);
+        left(j) -= upper_r(j, k) * left(k);
+      }
+    for (int j = 0; j < M; ++j) diagonal_r(j, j) = d_r(j);
+    return take(in, h, left, diagonal_r, u, d, step);
+  }
+
+  /// The process noise as weighted columns N to 2N: U_q and D_q.
+  template <int N, class S, class Q>
+  [[gnu::always_inline]] static Status factor_noise(const Q& q, detail::Column<N, S> (&w)[2 * N],
+                                                    S (&weights)[2 * N]) {
+    if constexpr (detail::is_structured<Q> && N <= 10) {
+      detail::Column<N, S> u[N];
+      S d[N];
+      const bool good = detail::ud_factor(q, u, d);
+      detail::each<N>([&](int j) {
+        w[N + j] = u[j];
+        weights[N + j] = d[j];
+      });
+      if (good) [[likely]]
+        return Status::accepted;
+      return detail::all_finite(q.dense()) ? Status::not_positive_definite : Status::not_finite;
+    } else if constexpr (detail::is_diagonal<Q>) {
+      bool finite = true, positive = true;
+      detail::each<N>([&](int j) {
+        w[N + j].set_zero();
+        detail::cut_below(w[N + j], j);
+        const S variance = q.values[static_cast<std::size_t>(j)];
+        weights[N + j] = variance;
+        finite = finite && detail::finite(variance);
+        positive = positive && variance >= S(0);
+      });
+      if (!finite) return Status::not_finite;
+      return positive ? Status::accepted : Status::not_positive_definite;
+    } else {
+      const Matrix<N, N, S> dense = detail::dense_of(q);
+      Matrix<N, N, S> upper;
+      Vector<N, S> diagonal = Vector<N, S>::Zero();
+      if (!detail::ud_factor<N, S>(dense, upper, diagonal))
+        return detail::all_finite(dense) ? Status::not_positive_definite : Status::not_finite;
+      detail::each<N>([&](int j) {
+        w[N + j].load(upper.data() + j * N);
+        weights[N + j] = diagonal(j);
+      });
+      return Status::accepted;
+    }
+  }
+
+  template <int N, class S>
+  [[gnu::always_inline]] static bool finite(const Columns<N, S>& u, const detail::Column<N, S>& d) {
+    detail::Column<N, S> none = d;
+    none.scale(S(0));
+    detail::each<N>([&](int j) { none.add(u[j], S(0)); });
+    S sum(0);
+    detail::each<N>([&](int i) { sum += none[i]; });
+    return sum == S(0);
+  }
+  template <Manifold X, int N, class S>
+  [[gnu::always_inline]] static void keep(UDGaussian<X>& belief, const Columns<N, S>& u,
+                                          const detail::Column<N, S>& d) {
+    detail::each<N>([&](int j) { u[j].store(belief.upper.data() + j * N); });
+    d.store(belief.diagonal.data());
+  }
+
+  template <int M, int N, class S, Manifold X>
+  Status verdict(const Innovation<M, S>& in, bool regular, const UDGaussian<X>& belief,
+                 const Columns<N, S>& u, const detail::Column<N, S>& d,
+                 const detail::Column<N, S>& step) const {
+    if (!detail::all_finite(in.residual) || !detail::all_finite(in.covariance) ||
+        !detail::finite_state(belief.mean))
+      return Status::not_finite;
+    S moved(0);
+    detail::each<N>([&](int i) { moved += step[i] * S(0); });
+    if (!regular || !(moved == S(0)) || !finite(u, d)) return Status::not_positive_definite;
+    return in.nis <= static_cast<S>(gate) ? Status::accepted : Status::gated;
   }
 };
 

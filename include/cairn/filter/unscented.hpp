@@ -21,27 +21,48 @@
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/sigma_points.hpp>
 #include <cairn/filter/status.hpp>
+#include <cairn/filter/wide.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn::inline CAIRN_ABI {
 
 namespace detail {
 
-/// The update when only moments are known: C = cov(x, z), S = cov(z). Same checks as correct().
-template <Manifold X, int M>
-[[nodiscard]] Innovation<M, ScalarOf<X>> correct_by_moments(Gaussian<X>& belief,
-                                                            const Matrix<dof<X>, M, ScalarOf<X>>& cross,
-                                                            const Matrix<M, M, ScalarOf<X>>& covariance,
-                                                            const Vector<M, ScalarOf<X>>& residual,
-                                                            double gate) {
-  using S = ScalarOf<X>;
+/// The update when only moments are known: C = cov(x, z) and S = cov(z), both used up, S lower triangle.
+/// Same checks as correct().
+template <Manifold X, int M, class S>
+[[gnu::always_inline]] inline void correct_by_moments(Gaussian<X>& belief, Column<dof<X>, S> (&cross)[M],
+                                                      Innovation<M, S>& in, double gate) {
   constexpr int n = dof<X>;
-  Innovation<M, S> in = fresh_innovation<M, S>(residual, symmetrised(covariance));
-  const int m = static_cast<int>(residual.size());
+  Candidate<n, M, S> out{};
+  Column<n, S>(&p)[n] = out.covariance;
+  load_columns(belief.covariance, p);
+  Correction<n, M, S> c;
+  bool good = c.fill(in.covariance, cross);
+  in.nis = c.take(in.residual.data(), out.step);
+  lower_by_squares(p, c.w);
+  good = good && gate > 0.0 && in.nis <= static_cast<S>(gate) && in.nis <= std::numeric_limits<S>::max() &&
+         is_covariance(p) && finite_state(belief.mean);
+  if (!good) [[unlikely]] {
+    in.status = diagnose<M, S>(in, belief.covariance, gate);
+    return;
+  }
+  Tangent<X> step;
+  out.step_to(step);
+  belief.mean = retract(belief.mean, step);
+  out.covariance_to(belief.covariance);
+}
+
+/// The same for any sizes, from matrices.
+template <Manifold X, int M, class S>
+void correct_by_moments(Gaussian<X>& belief, const Matrix<dof<X>, M, S>& cross, Innovation<M, S>& in,
+                        double gate) {
+  const int m = static_cast<int>(in.residual.size());
+  in.covariance = symmetrised(in.covariance);
   Matrix<M, M, S> lower = in.covariance;
   const bool regular = checked_root<M, S>(in.covariance, lower) && (lower.diagonal().array() > S(0)).all();
-  Matrix<n, M, S> w = cross;
-  Vector<M, S> y = residual;
+  Matrix<dof<X>, M, S> w = cross;
+  Vector<M, S> y = in.residual;
   for (int j = 0; j < m; ++j) {
     for (int k = 0; k < j; ++k) {
       w.col(j) -= lower(j, k) * w.col(k);
@@ -51,25 +72,25 @@ template <Manifold X, int M>
     y(j) /= lower(j, j);
   }
   in.nis = y.dot(y);
-  CovarianceOf<X> next = belief.covariance;
-  const Tangent<X> step = w * y;
-  if constexpr (n != dynamic && M != dynamic) {
-    Column<n, S> columns[n], squares[M];
-    for (int j = 0; j < n; ++j) columns[j].load(next.data() + j * n);
-    for (int k = 0; k < M; ++k) squares[k].load(w.data() + k * n);
-    lower_by_squares(columns, squares);
-    for (int j = 0; j < n; ++j) columns[j].store(next.data() + j * n);
-  } else {
-    next = symmetrised(next - w * w.transpose());
-  }
+  const CovarianceOf<X> next = symmetrised(belief.covariance - w * w.transpose());
   if (!regular || !(gate > 0.0) || !(in.nis <= static_cast<S>(gate)) ||
-      !(in.nis <= std::numeric_limits<S>::max()) || !is_valid_covariance<n, S>(next) ||
+      !(in.nis <= std::numeric_limits<S>::max()) || !is_valid_covariance<dof<X>, S>(next) ||
       !finite_state(belief.mean)) {
     in.status = diagnose<M, S>(in, belief.covariance, gate);
-    return in;
+    return;
   }
-  belief.mean = retract(belief.mean, step);
+  belief.mean = retract(belief.mean, Tangent<X>(w * y));
   belief.covariance = next;
+}
+
+template <Manifold X, int M>
+[[nodiscard]] Innovation<M, ScalarOf<X>> correct_by_moments(Gaussian<X>& belief,
+                                                            const Matrix<dof<X>, M, ScalarOf<X>>& cross,
+                                                            const Matrix<M, M, ScalarOf<X>>& covariance,
+                                                            const Vector<M, ScalarOf<X>>& residual,
+                                                            double gate) {
+  auto in = fresh_innovation<M, ScalarOf<X>>(residual, covariance);
+  correct_by_moments<X, M, ScalarOf<X>>(belief, cross, in, gate);
   return in;
 }
 
@@ -87,24 +108,17 @@ struct Unscented {
   Status predict(Gaussian<typename F::State>& belief, const F& process, const typename F::Control& control,
                  double dt) const {
     using X = typename F::State;
-    using S = ScalarOf<X>;
     if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
     const int n = dof_of(belief.mean);
     if (belief.covariance.rows() != n) return Status::size_mismatch;
     const double c2 = points.spread_squared(n);
     if (!(fading >= 1.0) || !(stabilising_noise >= 0.0) || !(c2 > 0.0)) return Status::bad_option;
-    CovarianceOf<X> root = belief.covariance;
-    if (!detail::checked_root<dof<X>, S>(belief.covariance, root)) return refusal<X>(belief);
-    const auto f = [&](const X& x) -> X { return process.propagate(x, control, dt); };
-    const auto next = detail::unscented_transform(belief.mean, root, f, c2, beta_minus_alpha2());
-    CovarianceOf<X> covariance = next.covariance * static_cast<S>(fading);
-    covariance += symmetrised(CovarianceOf<X>(process.noise(belief.mean, control, dt)));
-    for (int i = 0; i < n; ++i) covariance(i, i) += static_cast<S>(stabilising_noise);
-    if (!detail::all_finite(covariance) || !detail::finite_state(next.mean)) return Status::not_finite;
-    if (!detail::is_valid_covariance<dof<X>, S>(covariance)) return Status::not_positive_definite;
-    belief.mean = next.mean;
-    belief.covariance = covariance;
-    return Status::accepted;
+    const auto f = [&](const auto& x) { return process.propagate(x, control, dt); };
+    const detail::PointFunction<detail::is_wide<F>, decltype(f)> points_to{f};
+    if constexpr (dof<X> == dynamic)
+      return advance(belief, points_to, CovarianceOf<X>(process.noise(belief.mean, control, dt)), c2);
+    else
+      return advance(belief, points_to, process.noise(belief.mean, control, dt), c2);
   }
   template <ProcessModel F>
     requires std::same_as<typename F::Control, NoControl>
@@ -121,20 +135,107 @@ struct Unscented {
     using S = ScalarOf<X>;
     constexpr int m = dof<Z>;
     const double c2 = points.spread_squared(static_cast<int>(belief.covariance.rows()));
-    CovarianceOf<X> root = belief.covariance;
-    if (!(c2 > 0.0) || !detail::checked_root<dof<X>, S>(belief.covariance, root)) {
-      auto in =
-          detail::fresh_innovation<m, S>(local(Z(sensor.predict(belief.mean)), z), sensor.noise(belief.mean));
-      in.status = c2 > 0.0 ? refusal<X>(belief) : Status::bad_option;
+    if (!(c2 > 0.0)) return refused(belief, sensor, z, Status::bad_option);
+    const auto f = [&](const auto& x) { return sensor.predict(x); };
+    const detail::PointFunction<detail::is_wide<H>, decltype(f)> h{f};
+    if constexpr (dof<X> == dynamic || m == dynamic) {
+      CovarianceOf<X> root = belief.covariance;
+      if (!detail::checked_root<dof<X>, S>(belief.covariance, root))
+        return refused(belief, sensor, z, refusal<X>(belief));
+      const auto out = detail::unscented_transform(
+          belief.mean, root, [&](const X& x) -> Z { return sensor.predict(x); }, c2, beta_minus_alpha2());
+      auto in = detail::fresh_innovation<m, S>(local(out.mean, z), out.covariance);
+      in.covariance += Matrix<m, m, S>(sensor.noise(belief.mean));
+      detail::correct_by_moments<X, m, S>(belief, out.cross, in, gate);
+      return in;
+    } else {
+      constexpr int n = dof<X>;
+      detail::Column<n, S> root[n];
+      if (!detail::covariance_root(belief.covariance, root)) [[unlikely]]
+        return refused(belief, sensor, z, refusal<X>(belief));
+      const Z center = sensor.predict(belief.mean);
+      auto moments = detail::sum_points<detail::Pairs::with_cross>(
+          belief.mean, root, h, detail::spread<S>(c2), beta_minus_alpha2(), center);
+      Tangent<Z> mean;
+      moments.mean.store(mean.data());
+      Innovation<m, S> in;
+      in.residual = local(Z(retract(center, mean)), z);
+      const Matrix<m, m, S> r = detail::dense_of(sensor.noise(belief.mean));
+      detail::each<m>([&](int b) {
+        detail::each<m>(b, m, [&](int a) {
+          in.covariance(a, b) = in.covariance(b, a) = moments.covariance[b][a] + r(a, b);
+        });
+      });
+      detail::correct_by_moments<X, m, S>(belief, moments.cross, in, gate);
       return in;
     }
-    const auto h = [&](const X& x) -> Z { return sensor.predict(x); };
-    const auto out = detail::unscented_transform(belief.mean, root, h, c2, beta_minus_alpha2());
-    return detail::correct_by_moments<X, m>(belief, out.cross, out.covariance + sensor.noise(belief.mean),
-                                            local(out.mean, z), gate);
   }
 
 private:
+  /// Predict for sizes known at compile time.
+  template <Manifold X, class F, class Q>
+    requires(dof<X> != dynamic)
+  [[gnu::always_inline]] Status advance(Gaussian<X>& belief, const F& f, const Q& q, double c2) const {
+    using S = ScalarOf<X>;
+    constexpr int n = dof<X>;
+    detail::Column<n, S> root[n], noise[n];
+    if (!detail::covariance_root(belief.covariance, root)) [[unlikely]]
+      return refusal<X>(belief);
+    const X center = f(belief.mean);
+    auto moments = detail::sum_points<detail::Pairs::without_cross>(
+        belief.mean, root, f, detail::spread<S>(c2), beta_minus_alpha2(), center);
+    detail::load_columns(q, noise);
+    if constexpr (!detail::is_diagonal<Q>) detail::mirror_lower(noise);
+    detail::Column<n, S>(&p)[n] = moments.covariance;
+    detail::each<n>([&](int j) {
+      p[j].scale(static_cast<S>(fading));
+      p[j].add(noise[j]);
+    });
+    if (stabilising_noise > 0.0) [[unlikely]]
+      detail::add_to_diagonal(p, static_cast<S>(stabilising_noise));
+    Tangent<X> step;
+    moments.mean.store(step.data());
+    const X mean = retract(center, step);
+    if (!detail::finite_variances(p) || !detail::finite_state(mean)) [[unlikely]]
+      return detail::diagnose_prediction(p, mean);
+    if (!detail::is_covariance(p)) [[unlikely]]
+      return Status::not_positive_definite;
+    belief.mean = mean;
+    detail::each<n>([&](int j) { p[j].store(belief.covariance.data() + j * n); });
+    return Status::accepted;
+  }
+
+  /// The same for sizes known at run time.
+  template <Manifold X, class F>
+    requires(dof<X> == dynamic)
+  Status advance(Gaussian<X>& belief, const F& f, const CovarianceOf<X>& q, double c2) const {
+    using S = ScalarOf<X>;
+    CovarianceOf<X> root = belief.covariance;
+    if (!detail::checked_root<dof<X>, S>(belief.covariance, root)) return refusal<X>(belief);
+    const auto next = detail::unscented_transform(
+        belief.mean, root, [&](const X& x) -> X { return f(x); }, c2, beta_minus_alpha2());
+    CovarianceOf<X> covariance = next.covariance * static_cast<S>(fading);
+    covariance += symmetrised(q);
+    for (int i = 0; i < static_cast<int>(covariance.rows()); ++i)
+      covariance(i, i) += static_cast<S>(stabilising_noise);
+    if (!detail::all_finite(covariance) || !detail::finite_state(next.mean)) return Status::not_finite;
+    if (!detail::is_valid_covariance<dof<X>, S>(covariance)) return Status::not_positive_definite;
+    belief.mean = next.mean;
+    belief.covariance = covariance;
+    return Status::accepted;
+  }
+
+  template <class H>
+  [[gnu::cold]] Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> refused(
+      const Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z,
+      Status status) const {
+    using Z = typename H::Measurement;
+    auto in = detail::fresh_innovation<dof<Z>, ScalarOf<typename H::State>>(
+        local(Z(sensor.predict(belief.mean)), z), detail::dense_of(sensor.noise(belief.mean)));
+    in.status = status;
+    return in;
+  }
+
   [[nodiscard]] double beta_minus_alpha2() const noexcept {
     return points.beta - points.alpha * points.alpha;
   }

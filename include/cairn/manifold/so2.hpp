@@ -83,7 +83,7 @@ struct manifold_traits<BasicSO2<S>> {
   static constexpr int dof = 1;
   static BasicSO2<S> retract(const BasicSO2<S>& x, const Tangent& d) { return BasicSO2<S>(x.angle() + d(0)); }
   static Tangent local(const BasicSO2<S>& x, const BasicSO2<S>& y) {
-    return Tangent(wrapped<S>(y.angle() - x.angle()));
+    return Tangent(wrapped(S(y.angle() - x.angle())));
   }
   static bool finite(const BasicSO2<S>& x) { return x.angle() - x.angle() == S(0); }
 };

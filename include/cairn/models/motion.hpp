@@ -23,14 +23,16 @@ namespace cairn::inline CAIRN_ABI {
 
 namespace detail {
 
-/// [I dt I; 0 I] and its like: ones on the diagonal, given numbers on the D-th (and 2D-th) superdiagonal.
-template <int D, int Orders>
+/// D axes with a matrix of their derivatives each: [I dt I; 0 I] and its like (Upper), or full (noise).
+template <int D, int Orders, bool Upper>
 consteval auto chain_pattern() {
   constexpr int n = D * Orders;
   Pattern<static_cast<std::size_t>(n) * (n + 1)> pattern;
   for (int i = 0; i < n; ++i)
-    for (int j = 0; j <= n; ++j)
-      pattern.text[i * (n + 1) + j] = j == n ? ' ' : (i == j ? '1' : (j > i && (j - i) % D == 0 ? '*' : '.'));
+    for (int j = 0; j <= n; ++j) {
+      const char here = Upper && i == j ? '1' : ((!Upper || j > i) && (j - i) % D == 0 ? '*' : '.');
+      pattern.text[i * (n + 1) + j] = j == n ? ' ' : here;
+    }
   pattern.text[n * (n + 1) - 1] = '\0';
   return pattern;
 }
@@ -51,18 +53,19 @@ struct ConstantVelocity {
     for (int i = 0; i < D; ++i) next(i) += dt * x(D + i);
     return next;
   }
-  [[nodiscard]] Structured<detail::chain_pattern<D, 2>()> jacobian(const State&, const Control&,
-                                                                   double dt) const {
-    Structured<detail::chain_pattern<D, 2>()> f;
+  [[nodiscard]] Structured<detail::chain_pattern<D, 2, true>()> jacobian(const State&, const Control&,
+                                                                         double dt) const {
+    Structured<detail::chain_pattern<D, 2, true>()> f;
     f.values.fill(dt);
     return f;
   }
-  [[nodiscard]] Matrix<2 * D> noise(const State&, const Control&, double dt) const {
-    Matrix<2 * D> q = Matrix<2 * D>::Zero();
-    for (int i = 0; i < D; ++i) {
-      q(i, i) = density * dt * dt * dt / 3.0;
-      q(i, D + i) = q(D + i, i) = density * dt * dt / 2.0;
-      q(D + i, D + i) = density * dt;
+  [[nodiscard]] Structured<detail::chain_pattern<D, 2, false>()> noise(const State&, const Control&,
+                                                                       double dt) const {
+    Structured<detail::chain_pattern<D, 2, false>()> q;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(D); ++i) {
+      q.values[2 * i] = density * dt * dt * dt / 3.0;
+      q.values[2 * i + 1] = q.values[2 * (D + i)] = density * dt * dt / 2.0;
+      q.values[2 * (D + i) + 1] = density * dt;
     }
     return q;
   }
@@ -85,9 +88,9 @@ struct ConstantAcceleration {
     }
     return next;
   }
-  [[nodiscard]] Structured<detail::chain_pattern<D, 3>()> jacobian(const State&, const Control&,
-                                                                   double dt) const {
-    Structured<detail::chain_pattern<D, 3>()> f;
+  [[nodiscard]] Structured<detail::chain_pattern<D, 3, true>()> jacobian(const State&, const Control&,
+                                                                         double dt) const {
+    Structured<detail::chain_pattern<D, 3, true>()> f;
     for (std::size_t i = 0; i < static_cast<std::size_t>(D); ++i) {
       f.values[2 * i] = dt;
       f.values[2 * i + 1] = 0.5 * dt * dt;
@@ -95,14 +98,17 @@ struct ConstantAcceleration {
     }
     return f;
   }
-  [[nodiscard]] Matrix<3 * D> noise(const State&, const Control&, double dt) const {
-    const double factorial[] = {1, 1, 2, 6};
-    Matrix<3 * D> q = Matrix<3 * D>::Zero();
+  [[nodiscard]] Structured<detail::chain_pattern<D, 3, false>()> noise(const State&, const Control&,
+                                                                       double dt) const {
+    constexpr double factorial[] = {1, 1, 2, 6};
+    double powers[6] = {1};
+    for (int k = 1; k < 6; ++k) powers[k] = powers[k - 1] * dt;
+    Structured<detail::chain_pattern<D, 3, false>()> q;
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b) {
         const int power = 5 - a - b;  // integral of dt^(2-a)/(2-a)! dt^(2-b)/(2-b)!
-        const double value = density * std::pow(dt, power) / (power * factorial[2 - a] * factorial[2 - b]);
-        for (int i = 0; i < D; ++i) q(a * D + i, b * D + i) = value;
+        const double value = density * powers[power] / (power * factorial[2 - a] * factorial[2 - b]);
+        for (int i = 0; i < D; ++i) q.values[static_cast<std::size_t>(3 * (a * D + i) + b)] = value;
       }
     return q;
   }
@@ -124,8 +130,8 @@ struct Unicycle {
   [[nodiscard]] Matrix<3> jacobian(const State&, const Control& u, double dt) const {
     return SE2::exp(Vector<3>(-u(0) * dt, 0.0, -u(1) * dt)).adjoint();
   }
-  [[nodiscard]] Matrix<3> noise(const State&, const Control&, double dt) const {
-    return (dt * Vector<3>(speed_density, slip_density, turn_density)).asDiagonal();
+  [[nodiscard]] Diagonal<3> noise(const State&, const Control&, double dt) const {
+    return {{dt * speed_density, dt * slip_density, dt * turn_density}};
   }
 };
 

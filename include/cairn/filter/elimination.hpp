@@ -1,0 +1,128 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// Is a matrix a covariance, and what is its root: symmetric elimination along columns, for sizes known at
+/// compile time.
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/filter/column.hpp>
+#include <cairn/filter/column_shapes.hpp>
+#include <cairn/filter/kernels.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn::inline CAIRN_ABI::detail {
+
+/// Eliminates the columns of a symmetric matrix one after the other (L D L^T without roots) and hands each to
+/// keep(j, column, pivot) before it is used; column j is L d_j from row j on. False where the matrix is not
+/// finite or not positive semi-definite up to the rounding of its own diagonal. O(N^3 / 6).
+template <int N, class S, class Keep>
+[[gnu::always_inline]] [[nodiscard]] inline bool eliminate(Column<N, S> (&columns)[N], const Keep& keep) {
+  constexpr S slack = S(64) * std::numeric_limits<S>::epsilon();
+  S diagonal[N];
+  each<N>([&](int j) { diagonal[j] = columns[j][j]; });
+  bool good = true;
+  each<N>([&](int j) {
+    const S pivot = columns[j][j];
+    const S floor = slack * diagonal[j];
+    if (!(pivot > floor)) [[unlikely]] {  // NaN, negative, or a direction without uncertainty
+      good =
+          good && pivot >= -floor && diagonal[j] >= S(0) && diagonal[j] < std::numeric_limits<S>::infinity();
+      for (int k = j + 1; k < N; ++k)
+        good = good && columns[j][k] * columns[j][k] <= S(4) * slack * diagonal[j] * diagonal[k];
+      keep(j, columns[j], S(0));
+    } else {
+      keep(j, columns[j], pivot);
+      const S inverse = S(1) / pivot;
+      each<N>(j + 1, N, [&](int k) { columns[k].subtract(columns[j], columns[j][k] * inverse); });
+    }
+  });
+  return good;
+}
+template <int N, class S, class Keep>
+[[gnu::always_inline]] [[nodiscard]] inline bool eliminate(const Matrix<N, N, S>& a, const Keep& keep) {
+  Column<N, S> columns[N];
+  load_columns(a, columns);
+  return eliminate(columns, keep);
+}
+
+/// The same where every pivot is well above zero, with one branch at the end; false says nothing about the
+/// matrix but that eliminate() must look at it. Only rows on and below the diagonal are kept up.
+template <int N, class S, class Keep>
+[[gnu::always_inline]] [[nodiscard]] inline bool eliminate_regular(Column<N, S> (&columns)[N],
+                                                                   const Keep& keep) {
+  constexpr S slack = S(64) * std::numeric_limits<S>::epsilon();
+  constexpr int width = Column<N, S>::width;
+  S diagonal[N];
+  each<N>([&](int j) { diagonal[j] = columns[j][j]; });
+  bool regular = true;
+  each<N>([&](int j) {
+    const S pivot = columns[j][j];
+    regular &= pivot > slack * diagonal[j];
+    keep(j, columns[j], pivot);
+    const S inverse = S(1) / pivot;
+    each<N>(j + 1, N, [&](int k) {
+      const S factor = columns[j][k] * inverse;
+      for (int lane = k / width; lane < Column<N, S>::count; ++lane)
+        columns[k].lanes[lane] -= columns[j].lanes[lane] * factor;
+    });
+  });
+  return regular;
+}
+
+/// Symmetric `a` is finite and positive semi-definite.
+template <int N, class S>
+[[nodiscard]] inline bool is_covariance(const Matrix<N, N, S>& a) {
+  return eliminate(a, [](int, const Column<N, S>&, const S&) {});
+}
+template <int N, class S>
+[[nodiscard, gnu::cold, gnu::noinline]] bool is_semi_definite(const Column<N, S> (&p)[N]) {
+  Column<N, S> work[N];
+  for (int j = 0; j < N; ++j) work[j] = p[j];
+  return eliminate(work, [](int, const Column<N, S>&, const S&) {});
+}
+template <int N, class S>
+[[gnu::always_inline]] [[nodiscard]] inline bool is_covariance(const Column<N, S> (&p)[N]) {
+  Column<N, S> work[N];
+  each<N>([&](int j) { work[j] = p[j]; });
+  return eliminate_regular(work, [](int, const Column<N, S>&, const S&) {}) || is_semi_definite(p);
+}
+
+/// Lower triangular root with root root^T = a; a direction without variance gives a column of zeros. False,
+/// and no use, where `a` is no covariance.
+template <int N, class S>
+[[nodiscard, gnu::cold, gnu::noinline]] bool careful_root(const Matrix<N, N, S>& a, Column<N, S> (&root)[N]) {
+  using std::sqrt;
+  return eliminate(a, [&](int j, const Column<N, S>& column, const S& pivot) {
+    root[j] = column;
+    root[j].scale(pivot > S(0) ? S(1) / sqrt(pivot) : S(0));
+    clear_before(root[j], j);
+  });
+}
+template <int N, class S>
+[[gnu::always_inline]] [[nodiscard]] inline bool covariance_root(const Matrix<N, N, S>& a,
+                                                                 Column<N, S> (&root)[N]) {
+  using std::sqrt;
+  Column<N, S> work[N];
+  load_columns(a, work);
+  const bool regular = eliminate_regular(
+      work, [&](int j, const Column<N, S>& column, const S& pivot) __attribute__((always_inline)) {
+        root[j] = column;
+        root[j].scale(S(1) / sqrt(pivot));
+        clear_before(root[j], j);
+      });
+  return regular || careful_root(a, root);
+}
+template <int N, class S>
+[[nodiscard]] inline bool covariance_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& root) {
+  Column<N, S> columns[N];
+  const bool good = covariance_root(a, columns);
+  each<N>([&](int j) { columns[j].store(root.data() + j * N); });
+  return good;
+}
+
+}  // namespace cairn::inline CAIRN_ABI::detail
