@@ -42,14 +42,22 @@ struct Still {
   [[nodiscard]] const cairn::Matrix<3>& noise(const State&, const Control&, double) const { return q; }
 };
 
+/// Where the vehicle starts.
+inline cairn::Vector<5> vehicle_start() {
+  return (cairn::Vector<5>() << 0, 0, 0, 1, 0.1).finished();
+}
+
 /// (x, y, heading, speed, turn rate) along the tangent, and a beacon at (10, 5).
 struct Vehicle {
   using State = cairn::Vector<5>;
   using Control = cairn::NoControl;
-  [[nodiscard]] State propagate(const State& x, const Control&, double dt) const {
-    State next = x;
-    next(0) += dt * x(3) * std::cos(x(2));
-    next(1) += dt * x(3) * std::sin(x(2));
+  template <class T>
+  [[nodiscard]] cairn::Vector<5, T> propagate(const cairn::Vector<5, T>& x, const Control&, double dt) const {
+    using std::cos;
+    using std::sin;
+    cairn::Vector<5, T> next = x;
+    next(0) += dt * x(3) * cos(x(2));
+    next(1) += dt * x(3) * sin(x(2));
     next(2) += dt * x(4);
     return next;
   }
@@ -58,51 +66,59 @@ struct Vehicle {
     const double c = std::cos(x(2)), s = std::sin(x(2));
     return {{-dt * x(3) * s, dt * c, dt * x(3) * c, dt * s, dt}};
   }
-  [[nodiscard]] cairn::Matrix<5> noise(const State&, const Control&, double) const {
-    return (cairn::Vector<5>() << 1e-4, 1e-4, 1e-5, 1e-2, 1e-3).finished().asDiagonal();
+  [[nodiscard]] cairn::Diagonal<5> noise(const State&, const Control&, double) const {
+    return {{1e-4, 1e-4, 1e-5, 1e-2, 1e-3}};
   }
 };
 struct Beacon {
   using State = cairn::Vector<5>;
   using Measurement = cairn::Product<cairn::Vector<1>, cairn::SO2>;
-  [[nodiscard]] Measurement predict(const State& x) const {
-    const double dx = 10.0 - x(0), dy = 5.0 - x(1);
-    return Measurement(cairn::Vector<1>(std::sqrt(dx * dx + dy * dy)), cairn::SO2(std::atan2(dy, dx) - x(2)));
+  template <class T>
+  [[nodiscard]] cairn::Product<cairn::Vector<1, T>, cairn::BasicSO2<T>> predict(
+      const cairn::Vector<5, T>& x) const {
+    using std::atan2;
+    using std::sqrt;
+    const T dx = 10.0 - x(0), dy = 5.0 - x(1);
+    return cairn::Product(cairn::Vector<1, T>(sqrt(dx * dx + dy * dy)),
+                          cairn::BasicSO2<T>(T(atan2(dy, dx) - x(2))));
   }
   [[nodiscard]] cairn::Structured<"**... ***.."> jacobian(const State& x) const {
     const double dx = 10.0 - x(0), dy = 5.0 - x(1);
     const double squared = dx * dx + dy * dy, range = std::sqrt(squared);
     return {{-dx / range, -dy / range, dy / squared, -dx / squared, -1.0}};
   }
-  [[nodiscard]] cairn::Matrix<2> noise(const State&) const {
-    return cairn::Vector<2>(0.01, 1e-3).asDiagonal();
-  }
+  [[nodiscard]] cairn::Diagonal<2> noise(const State&) const { return {{0.01, 1e-3}}; }
 };
 
 /// Nine states, three of them driven by sines of the others; three squared distances seen.
 struct Coupled {
   using State = cairn::Vector<9>;
   using Control = cairn::NoControl;
-  [[nodiscard]] State propagate(const State& x, const Control&, double dt) const {
-    State next = x;
+  template <class T>
+  [[nodiscard]] cairn::Vector<9, T> propagate(const cairn::Vector<9, T>& x, const Control&, double dt) const {
+    using std::sin;
+    cairn::Vector<9, T> next = x;
     for (int i = 0; i < 3; ++i) {
       next(i) += dt * x(3 + i);
       next(3 + i) += dt * x(6 + i);
-      next(6 + i) -= dt * std::sin(x(i));
+      next(6 + i) -= dt * sin(x(i));
     }
     return next;
   }
-  [[nodiscard]] cairn::Matrix<9> noise(const State&, const Control&, double) const {
-    return 1e-3 * cairn::Matrix<9>::Identity();
+  [[nodiscard]] cairn::Diagonal<9> noise(const State&, const Control&, double) const {
+    cairn::Diagonal<9> q;
+    q.values.fill(1e-3);
+    return q;
   }
 };
 struct CoupledSensor {
   using State = cairn::Vector<9>;
   using Measurement = cairn::Vector<3>;
-  [[nodiscard]] Measurement predict(const State& x) const {
+  template <class T>
+  [[nodiscard]] cairn::Vector<3, T> predict(const cairn::Vector<9, T>& x) const {
     return {x(0) + 0.1 * x(1) * x(1), x(1) + 0.1 * x(2) * x(2), x(2) + 0.1 * x(0) * x(0)};
   }
-  [[nodiscard]] cairn::Matrix<3> noise(const State&) const { return 0.1 * cairn::Matrix<3>::Identity(); }
+  [[nodiscard]] cairn::Diagonal<3> noise(const State&) const { return {{0.1, 0.1, 0.1}}; }
 };
 
 /// Inertial error state: position, velocity, attitude, accelerometer and gyroscope bias; position and
@@ -115,7 +131,7 @@ struct Inertial {
       "......1.....*** .......1....*** ........1...*** .........1..... ..........1.... ...........1... "
       "............1.. .............1. ..............1">;
   [[nodiscard]] State propagate(const State& x, const Control& u, double dt) const {
-    return jacobian(x, u, dt).dense() * x;
+    return jacobian(x, u, dt) * x;
   }
   [[nodiscard]] Jacobian jacobian(const State& x, const Control&, double dt) const {
     const double c = std::cos(x(8)), s = std::sin(x(8)), g = 9.81 * dt;
@@ -132,8 +148,10 @@ struct Inertial {
       for (int j = 0; j < 3; ++j) f.values[k++] = -r[i][j] * dt;
     return f;
   }
-  [[nodiscard]] cairn::Matrix<15> noise(const State&, const Control&, double) const {
-    return 1e-4 * cairn::Matrix<15>::Identity();
+  [[nodiscard]] cairn::Diagonal<15> noise(const State&, const Control&, double) const {
+    cairn::Diagonal<15> q;
+    q.values.fill(1e-4);
+    return q;
   }
 };
 

@@ -64,13 +64,13 @@ double extended_5_2(int steps) {
     if (k % 64 == 0) filter.vecX() << 0, 0, 0, 1, 0.1;
     const cairn::Vector<5> x = filter.vecX();
     filter.predictEkf([&](const auto& s) { return process.propagate(s, {}, time_step); },
-                      process.jacobian(x, {}, time_step).dense(), process.noise(x, {}, time_step));
+                      process.jacobian(x, {}, time_step).dense(), process.noise(x, {}, time_step).dense());
     const auto h = [&](const auto& s) {
       const auto seen = sensor.predict(s);
       return cairn::Vector<2>(seen.template part<0>()(0), seen.template part<1>().angle());
     };
     const cairn::Vector<2> seen = h(filter.vecX()) + z[static_cast<std::size_t>(k % 64)];
-    filter.correctEkf(h, seen, sensor.noise(x), sensor.jacobian(filter.vecX()).dense());
+    filter.correctEkf(h, seen, sensor.noise(x).dense(), sensor.jacobian(filter.vecX()).dense());
   }
   return filter.matP().trace();
 }
@@ -85,7 +85,7 @@ double extended_15_6(int steps) {
   for (int k = 0; k < steps; ++k) {
     const cairn::Vector<15> x = filter.vecX();
     filter.predictEkf([&](const auto& s) { return process.propagate(s, {}, time_step); },
-                      process.jacobian(x, {}, time_step).dense(), process.noise(x, {}, time_step));
+                      process.jacobian(x, {}, time_step).dense(), process.noise(x, {}, time_step).dense());
     filter.correctEkf([&](const auto& s) { return (h * s).eval(); }, z[static_cast<std::size_t>(k % 64)], r,
                       h);
   }

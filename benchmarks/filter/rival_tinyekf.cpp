@@ -28,7 +28,7 @@ double extended_15_6(int steps) {
   for (int k = 0; k < steps; ++k) {
     const cairn::Vector<15> x = Eigen::Map<const cairn::Vector<15>>(filter.x);
     const RowMajor15 f = process.jacobian(x, {}, time_step).dense();
-    const RowMajor15 q = process.noise(x, {}, time_step);
+    const RowMajor15 q = process.noise(x, {}, time_step).dense();
     const cairn::Vector<15> next = process.propagate(x, {}, time_step);
     ekf_predict(&filter, next.data(), f.data(), q.data());
     const cairn::Vector<6> seen = Eigen::Map<const cairn::Vector<15>>(filter.x).head<6>();

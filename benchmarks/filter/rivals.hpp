@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: MIT
 //
 /// @file
-/// What a rival offers: run `steps` predict-update steps of one problem. Empty where it is not installed
-/// (-DCAIRN_RIVAL_OPENKF=<folder of its sources>, -DCAIRN_RIVAL_TINYEKF=<folder of tinyekf.h>).
+/// What a contender offers: run `steps` predict-update steps of one problem. Empty where it has none, or is
+/// not installed (CMakeLists.txt says how rivals are given). One translation unit a library.
 #pragma once
 
 #include <functional>
@@ -20,9 +20,22 @@ struct Rival {
   Run landmark_3_3{};
   Run extended_5_2{};
   Run extended_15_6{};
+  Run unscented_5_2{};
+  Run unscented_9_3{};
+  Run factored_6_3{};  ///< square root or UD form
+  Run factored_15_6{};
 };
 
+Rival ours();
+Rival ours_unscented();
+Rival ours_factored();
+/// Means over the landmarks of a batch of 1000 that is stepped together.
+double batch_of_1000(int rounds);
+
+Rival hand_written();
 Rival openkf();
 Rival tinyekf();
+Rival mherb();
+Rival opencv();
 
 }  // namespace cairn_bench

@@ -1,13 +1,17 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 //
-/// @file
-/// What a careful user writes with Eigen and no library: the yardstick of the unscented rows.
-#pragma once
+// What a careful user writes with Eigen and no library: the yardstick of the unscented rows.
+#include <cmath>
+#include <cstddef>
 
-#include <cairn/core/linalg.hpp>
+#include <Eigen/Cholesky>
+
+#include "problems.hpp"
+#include "rivals.hpp"
 
 namespace cairn_bench {
+namespace {
 
 /// Additive unscented filter with weights W and points drawn anew for the update.
 template <int N, int M>
@@ -61,5 +65,42 @@ struct HandWrittenUnscented {
     p = (0.5 * (p + p.transpose())).eval();
   }
 };
+
+double unscented_5_2(int count) {
+  static const auto z = noise<2>(64, 0.1);
+  const Beacon sensor;
+  HandWrittenUnscented<5, 2> filter{vehicle_start(), cairn::Matrix<5>::Identity()};
+  const auto h = [&](const cairn::Vector<5>& x) {
+    const auto seen = sensor.predict(x);
+    return cairn::Vector<2>(seen.part<0>()(0), seen.part<1>().angle());
+  };
+  for (int k = 0; k < count; ++k) {
+    if (k % 64 == 0) filter.x = vehicle_start();
+    filter.predict([](const cairn::Vector<5>& x) { return Vehicle{}.propagate(x, {}, time_step); },
+                   Vehicle{}.noise(filter.x, {}, time_step).dense());
+    filter.update(h, sensor.noise(filter.x).dense(), h(filter.x) + z[static_cast<std::size_t>(k % 64)]);
+  }
+  return filter.p.trace();
+}
+double unscented_9_3(int count) {
+  static const auto z = noise<3>(64, 0.3);
+  HandWrittenUnscented<9, 3> filter{cairn::Vector<9>::Zero(), cairn::Matrix<9>::Identity()};
+  for (int k = 0; k < count; ++k) {
+    filter.predict([](const cairn::Vector<9>& x) { return Coupled{}.propagate(x, {}, time_step); },
+                   Coupled{}.noise(filter.x, {}, time_step).dense());
+    filter.update([](const cairn::Vector<9>& x) { return CoupledSensor{}.predict(x); },
+                  CoupledSensor{}.noise(filter.x).dense(), z[static_cast<std::size_t>(k % 64)]);
+  }
+  return filter.p.trace();
+}
+
+}  // namespace
+
+Rival hand_written() {
+  Rival rival{"hand-written Eigen"};
+  rival.unscented_5_2 = unscented_5_2;
+  rival.unscented_9_3 = unscented_9_3;
+  return rival;
+}
 
 }  // namespace cairn_bench
