@@ -32,7 +32,7 @@ public:
   using Belief = Gaussian<Vector<N, S>>;
   static constexpr int triangle = N * (N + 1) / 2;
   static constexpr int lanes = static_cast<int>(detail::lane_bytes<64, S> / sizeof(S));
-  using Lane = typename detail::LaneOf<S, detail::lane_bytes<64, S>>::type;
+  using Lane = typename detail::RegisterOf<S, detail::lane_bytes<64, S>>::type;
 
   /// `lanes` filters; covariance holds the lower triangle row by row.
   struct Block {

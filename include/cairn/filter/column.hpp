@@ -51,21 +51,21 @@ inline constexpr int lane_bytes =
 
 /// The register type of so many bytes; the number itself where there is none for it.
 template <class S, int Bytes>
-struct LaneOf {
+struct RegisterOf {
   using type = S;
 };
 template <int Bytes>
-struct LaneOf<double, Bytes> {
+struct RegisterOf<double, Bytes> {
   typedef double type __attribute__((vector_size(Bytes), may_alias));
 };
 template <int Bytes>
-struct LaneOf<float, Bytes> {
+struct RegisterOf<float, Bytes> {
   typedef float type __attribute__((vector_size(Bytes), may_alias));
 };
 
 /// W numbers in a register.
 template <class S, int W>
-using LaneOfWidth = typename LaneOf<S, W* static_cast<int>(sizeof(S))>::type;
+using LaneOfWidth = typename RegisterOf<S, W* static_cast<int>(sizeof(S))>::type;
 
 /// Lane l of the result is number Pick{}(l) of a and b written one after the other.
 template <int W, class Pick, class Lane>
@@ -139,7 +139,7 @@ template <class S, int W>
 /// N numbers in SIMD registers. Lanes beyond N hold zero after load() and are never read.
 template <int N, class S>
 struct Column {
-  using Lane = typename LaneOf<S, lane_bytes<N, S>>::type;
+  using Lane = typename RegisterOf<S, lane_bytes<N, S>>::type;
   static constexpr int width = static_cast<int>(sizeof(Lane) / sizeof(S));
   static constexpr int count = (N + width - 1) / width;
   Lane lanes[static_cast<std::size_t>(count)];

@@ -123,11 +123,11 @@ template <class A>
 }
 
 /// Rows of column j that a product is wanted for; the other rows are left with anything.
-enum class Rows { lower, all };
+enum class ProductRows { lower, all };
 
 /// sum[j] += A u[j] for square A. The columns of a structured A stay in registers and those that are empty
 /// are never multiplied.
-template <Rows Wanted, class A, int N, class S>
+template <ProductRows Wanted, class A, int N, class S>
 [[gnu::always_inline]] inline void add_product(const A& a, const Column<N, S> (&u)[N],
                                                Column<N, S> (&sum)[N]) {
   constexpr int width = Column<N, S>::width;
@@ -144,7 +144,8 @@ template <Rows Wanted, class A, int N, class S>
         constexpr int k = static_cast<int>(pair) / count;
         constexpr int lane = static_cast<int>(pair) % count;
         if constexpr (holds_entries<A, width>(k, lane) || (!unit && k / width == lane)) {
-          if (Wanted == Rows::all || lane >= j / width) sum[j].lanes[lane] += of_a[k].lanes[lane] * u[j][k];
+          if (Wanted == ProductRows::all || lane >= j / width)
+            sum[j].lanes[lane] += of_a[k].lanes[lane] * u[j][k];
         }
       });
     });
@@ -152,7 +153,7 @@ template <Rows Wanted, class A, int N, class S>
     load_columns(a, of_a);
     each<N>([&](int j) {
       each<N>([&](int k) {
-        for (int lane = Wanted == Rows::all ? 0 : j / width; lane < count; ++lane)
+        for (int lane = Wanted == ProductRows::all ? 0 : j / width; lane < count; ++lane)
           sum[j].lanes[lane] += of_a[k].lanes[lane] * u[j][k];
       });
     });
@@ -181,7 +182,7 @@ template <class A, int N, class S, class Q>
   if constexpr (is_identity<A>) {
     each<N>([&](int j) { out[j].add(u[j]); });
   } else {
-    add_product<Rows::lower>(a, u, out);
+    add_product<ProductRows::lower>(a, u, out);
     mirror_lower(out);
   }
 }

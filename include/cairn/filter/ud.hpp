@@ -75,7 +75,7 @@ struct UDFilter {
       fu[j].set_zero();
       weights[j] = belief.diagonal(j);
     });
-    detail::add_product<detail::Rows::all>(process.jacobian(belief.mean, control, dt), u, fu);
+    detail::add_product<detail::ProductRows::all>(process.jacobian(belief.mean, control, dt), u, fu);
     detail::each<n>([&](int j) { w[j] = fu[j]; });
     const X mean = process.propagate(belief.mean, control, dt);
     detail::Column<n, S> d;

@@ -70,16 +70,16 @@ template <class Options>
 }
 
 /// Normal equations of a pose step in world axes, a partial sum in each lane.
-class alignas(Lane) PoseEquations {
+class alignas(MatchLane) PoseEquations {
 public:
   /// (1) with y = R p for p and world axes for the step's.
-  [[gnu::always_inline]] void add(const StereoStatistics& s, const Lane& weight) noexcept {
-    Lane W[6], g[3];
+  [[gnu::always_inline]] void add(const StereoStatistics& s, const MatchLane& weight) noexcept {
+    MatchLane W[6], g[3];
     for (int i = 0; i < 6; ++i) W[i] = weight * s.information[i];
     for (int i = 0; i < 3; ++i) g[i] = weight * s.gradient[i];
-    const Lane(&y)[3] = s.y;
-    const Lane rows[3][3] = {{W[0], W[1], W[2]}, {W[1], W[3], W[4]}, {W[2], W[4], W[5]}};
-    Lane lever[3][3];  // W skew(y)
+    const MatchLane(&y)[3] = s.y;
+    const MatchLane rows[3][3] = {{W[0], W[1], W[2]}, {W[1], W[3], W[4]}, {W[2], W[4], W[5]}};
+    MatchLane lever[3][3];  // W skew(y)
     for (int i = 0; i < 3; ++i) {
       lever[i][0] = rows[i][1] * y[2] - rows[i][2] * y[1];
       lever[i][1] = rows[i][2] * y[0] - rows[i][0] * y[2];
@@ -121,7 +121,7 @@ public:
   }
 
 private:
-  Lane translation_[6] = {}, rotation_[6] = {}, coupling_[3][3] = {}, gradient_[6] = {};
+  MatchLane translation_[6] = {}, rotation_[6] = {}, coupling_[3][3] = {}, gradient_[6] = {};
 };
 
 /// Cholesky factor of an information matrix; nothing where a direction is undetermined given the others.

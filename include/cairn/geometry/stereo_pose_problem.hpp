@@ -64,7 +64,7 @@ class StereoPoseProblem {
 public:
   using Model = SE3;
   static constexpr std::size_t sample_size = 3;
-  static_assert(sample_size <= lane_count);
+  static_assert(sample_size <= match_lanes);
 
   StereoPoseProblem(const StereoRig& rig, std::span<const StereoMatch> matches,
                     const StereoPoseOptions& options, const std::optional<PosePrior>& prior)
@@ -73,12 +73,12 @@ public:
         prior_(prior),
         matches_(matches),
         triangulator_(rig, {.method = TriangulationMethod::weighted_midpoint, .max_gap = 5}),
-        lanes_((matches.size() + lane_count - 1) / lane_count),
+        lanes_((matches.size() + match_lanes - 1) / match_lanes),
         gate_(chi_square_quantile(options.gate_probability, dof())) {
     CAIRN_EXPECTS(options.loss_scale > 0, "stereo pose: loss_scale is positive");
     if (prior) check_start(prior->T_world_camera, prior->information);
     for (std::size_t i = 0; i < matches.size(); ++i)
-      prepare(matches[i], i, rig, options.right_rows, lanes_[i / lane_count]);
+      prepare(matches[i], i, rig, options.right_rows, lanes_[i / match_lanes]);
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return matches_.size(); }
@@ -95,7 +95,7 @@ public:
       source[k] = seen.point;
       target[k] = m.landmark;
       weights[k] = 1 / (seen.point(2) * seen.point(2) * seen.point(2) * seen.point(2));
-      copy_lane(lanes_[sample[k] / lane_count], sample[k] % lane_count, lanes[0], k);
+      copy_lane(lanes_[sample[k] / match_lanes], sample[k] % match_lanes, lanes[0], k);
     }
     if (too_narrow(source) || too_narrow(target)) return false;
     const Alignment start = align_points(source, target, weights);
@@ -124,8 +124,8 @@ public:
     const StereoView view(pose, rig_);
     StereoStatistics s;
     for (std::size_t i = 0; i < mask.size(); ++i) {
-      if (i % lane_count == 0) evaluate(lanes_[i / lane_count], view, gate_, s);
-      mask[i] = s.chi_squared[i % lane_count] < gate_;
+      if (i % match_lanes == 0) evaluate(lanes_[i / match_lanes], view, gate_, s);
+      mask[i] = s.chi_squared[i % match_lanes] < gate_;
     }
   }
 
@@ -161,15 +161,15 @@ private:
   [[nodiscard]] int dof() const noexcept { return options_.right_rows ? 4 : 3; }
 
   [[gnu::always_inline]] RansacScore score_lanes(const StereoView& view, double limit) const noexcept {
-    Lane cost = {};  // less what the lanes without a match will add
-    cost[0] = -static_cast<double>(lanes_.size() * lane_count - matches_.size()) * gate_;
+    MatchLane cost = {};  // less what the lanes without a match will add
+    cost[0] = -static_cast<double>(lanes_.size() * match_lanes - matches_.size()) * gate_;
     decltype(cost < cost) inliers = {};
     StereoStatistics s;
     for (std::size_t i = 0; i < lanes_.size(); ++i) {
       evaluate(lanes_[i], view, gate_, s);
       const auto inside = s.chi_squared < gate_;
       inliers -= inside;  // true is -1
-      cost += inside ? s.chi_squared : gate_ + Lane{};
+      cost += inside ? s.chi_squared : gate_ + MatchLane{};
       if (i % 4 == 3 && sum(cost) > limit) break;
     }
     return {sum(cost), static_cast<std::size_t>((inliers[0] + inliers[1]) + (inliers[2] + inliers[3]))};
@@ -181,8 +181,8 @@ private:
     StereoStatistics s;
     for (const MatchLanes& m : matches) {
       if (!evaluate(m, view, gate, s)) continue;
-      Lane weight;
-      for (std::size_t lane = 0; lane < lane_count; ++lane) {
+      MatchLane weight;
+      for (std::size_t lane = 0; lane < match_lanes; ++lane) {
         const double chi_squared = s.chi_squared[lane];
         weight[lane] = chi_squared < gate ? robust_weight(loss, loss_scale, chi_squared) : 0;
       }

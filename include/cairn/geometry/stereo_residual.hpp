@@ -47,44 +47,44 @@ namespace detail {
 
 /// Four doubles: one AVX register, or two of SSE2. Passed by reference only: by value their calling
 /// convention depends on the instruction set.
-using Lane = double __attribute__((vector_size(32), aligned(32)));  // gcc without AVX would take 16
-inline constexpr std::size_t lane_count = 4;
-static_assert(sizeof(Lane) == 32 && alignof(Lane) == 32);
+using MatchLane = double __attribute__((vector_size(32), aligned(32)));  // gcc without AVX would take 16
+inline constexpr std::size_t match_lanes = 4;
+static_assert(sizeof(MatchLane) == 32 && alignof(MatchLane) == 32);
 
 /// The sum of the lanes, in an order that is the same everywhere.
-[[nodiscard]] inline double sum(const Lane& lane) noexcept {
+[[nodiscard]] inline double sum(const MatchLane& lane) noexcept {
   return (lane[0] + lane[1]) + (lane[2] + lane[3]);
 }
 
 /// One camera's observations: normalised coordinates, and what whitens their residuals.
-struct alignas(Lane) WhitenedPixels {
-  Lane x, y;
-  Lane xx, xy, yx, yy;  // rows of d pixel / d normalised, divided by sigma
+struct alignas(MatchLane) WhitenedPixels {
+  MatchLane x, y;
+  MatchLane xx, xy, yx, yy;  // rows of d pixel / d normalised, divided by sigma
 };
 
 /// Four StereoMatches made ready for many evaluations.
-struct alignas(Lane) MatchLanes {
-  Lane landmark[3];
-  Lane covariance[6];  // 00 01 02 11 12 22
-  Lane spread;         // trace of the covariance
+struct alignas(MatchLane) MatchLanes {
+  MatchLane landmark[3];
+  MatchLane covariance[6];  // 00 01 02 11 12 22
+  MatchLane spread;         // trace of the covariance
   WhitenedPixels left, right;
-  Lane usable;  // 1 or 0
+  MatchLane usable;  // 1 or 0
 };
 
-/// Lane `from_lane` of `from` becomes lane `to_lane` of `to`.
+/// MatchLane `from_lane` of `from` becomes lane `to_lane` of `to`.
 inline void copy_lane(const MatchLanes& from, std::size_t from_lane, MatchLanes& to,
                       std::size_t to_lane) noexcept {
   using Doubles = std::array<double, sizeof(MatchLanes) / sizeof(double)>;
   const auto source = std::bit_cast<Doubles>(from);
   auto target = std::bit_cast<Doubles>(to);
-  for (std::size_t i = 0; i < source.size(); i += lane_count) target[i + to_lane] = source[i + from_lane];
+  for (std::size_t i = 0; i < source.size(); i += match_lanes) target[i + to_lane] = source[i + from_lane];
   to = std::bit_cast<MatchLanes>(target);
 }
 
 /// Pose and rig as the loops need them, every number in all lanes.
-struct alignas(Lane) StereoView {
-  Lane left[9], right[9];  // rotations from world axes, row by row
-  Lane camera[3], t_right_left[3];
+struct alignas(MatchLane) StereoView {
+  MatchLane left[9], right[9];  // rotations from world axes, row by row
+  MatchLane camera[3], t_right_left[3];
   double nearest;  // a point so near that its disparity is 20 focal lengths was not seen by both cameras
 
   StereoView(const SE3& T_world_camera, const StereoRig& rig) : nearest(0.05 * rig.baseline()) {
@@ -102,36 +102,36 @@ struct alignas(Lane) StereoView {
   }
 
 private:
-  static void fill(Lane& lane, double value) noexcept {
-    for (std::size_t i = 0; i < lane_count; ++i) lane[i] = value;
+  static void fill(MatchLane& lane, double value) noexcept {
+    for (std::size_t i = 0; i < match_lanes; ++i) lane[i] = value;
   }
 };
 
 /// What four matches say at a view.
-struct alignas(Lane) StereoStatistics {
-  Lane y[3];            // landmarks from the camera's centre, world axes
-  Lane chi_squared;     // infinite where a camera cannot see the landmark
-  Lane gradient[3];     // (3)
-  Lane information[6];  // (4): 00 01 02 11 12 22
+struct alignas(MatchLane) StereoStatistics {
+  MatchLane y[3];            // landmarks from the camera's centre, world axes
+  MatchLane chi_squared;     // infinite where a camera cannot see the landmark
+  MatchLane gradient[3];     // (3)
+  MatchLane information[6];  // (4): 00 01 02 11 12 22
 };
 
 /// Residuals of both cameras: r^T r, A and b of (1).
-struct alignas(Lane) StereoResidual {
-  Lane squares, A[6], b[3];
+struct alignas(MatchLane) StereoResidual {
+  MatchLane squares, A[6], b[3];
 };
 
 /// Adds one camera's part: `R` turns world axes into its frame, p is the landmark there.
-[[gnu::always_inline]] inline void add_pixels(const WhitenedPixels& o, const Lane (&R)[9], const Lane (&p)[3],
-                                              StereoResidual& s) noexcept {
-  const Lane inverse = 1.0 / p[2], x = p[0] * inverse, y = p[1] * inverse;
-  const Lane ex = o.x - x, ey = o.y - y;
-  const Lane w[2][2] = {{o.xx, o.xy}, {o.yx, o.yy}};
+[[gnu::always_inline]] inline void add_pixels(const WhitenedPixels& o, const MatchLane (&R)[9],
+                                              const MatchLane (&p)[3], StereoResidual& s) noexcept {
+  const MatchLane inverse = 1.0 / p[2], x = p[0] * inverse, y = p[1] * inverse;
+  const MatchLane ex = o.x - x, ey = o.y - y;
+  const MatchLane w[2][2] = {{o.xx, o.xy}, {o.yx, o.yy}};
   for (int i = 0; i < 2; ++i) {
-    const Lane r = w[i][0] * ex + w[i][1] * ey;
-    const Lane j0 = w[i][0] * inverse, j1 = w[i][1] * inverse, j2 = -(j0 * x + j1 * y);
-    const Lane a = j0 * R[0] + j1 * R[3] + j2 * R[6];
-    const Lane b = j0 * R[1] + j1 * R[4] + j2 * R[7];
-    const Lane c = j0 * R[2] + j1 * R[5] + j2 * R[8];
+    const MatchLane r = w[i][0] * ex + w[i][1] * ey;
+    const MatchLane j0 = w[i][0] * inverse, j1 = w[i][1] * inverse, j2 = -(j0 * x + j1 * y);
+    const MatchLane a = j0 * R[0] + j1 * R[3] + j2 * R[6];
+    const MatchLane b = j0 * R[1] + j1 * R[4] + j2 * R[7];
+    const MatchLane c = j0 * R[2] + j1 * R[5] + j2 * R[8];
     s.squares += r * r;
     s.A[0] += a * a;
     s.A[1] += a * b;
@@ -146,21 +146,23 @@ struct alignas(Lane) StereoResidual {
 }
 
 /// (1) to (4) for a landmark with covariance C; turns the residual's A and b into information and gradient.
-[[gnu::always_inline]] inline void weigh_landmark(const Lane (&C)[6], const StereoResidual& r,
+[[gnu::always_inline]] inline void weigh_landmark(const MatchLane (&C)[6], const StereoResidual& r,
                                                   StereoStatistics& s) noexcept {
-  const Lane(&A)[6] = r.A;
-  const Lane m00 = 1.0 + A[0] * C[0] + A[1] * C[1] + A[2] * C[2],
-             m01 = A[0] * C[1] + A[1] * C[3] + A[2] * C[4], m02 = A[0] * C[2] + A[1] * C[4] + A[2] * C[5],
-             m10 = A[1] * C[0] + A[3] * C[1] + A[4] * C[2],
-             m11 = 1.0 + A[1] * C[1] + A[3] * C[3] + A[4] * C[4],
-             m12 = A[1] * C[2] + A[3] * C[4] + A[4] * C[5], m20 = A[2] * C[0] + A[4] * C[1] + A[5] * C[2],
-             m21 = A[2] * C[1] + A[4] * C[3] + A[5] * C[4],
-             m22 = 1.0 + A[2] * C[2] + A[4] * C[4] + A[5] * C[5];
-  const Lane c00 = m11 * m22 - m12 * m21, c01 = m12 * m20 - m10 * m22, c02 = m10 * m21 - m11 * m20;
-  const Lane scale = 1.0 / (m00 * c00 + m01 * c01 + m02 * c02);
-  const Lane G[3][3] = {{c00 * scale, (m02 * m21 - m01 * m22) * scale, (m01 * m12 - m02 * m11) * scale},
-                        {c01 * scale, (m00 * m22 - m02 * m20) * scale, (m02 * m10 - m00 * m12) * scale},
-                        {c02 * scale, (m01 * m20 - m00 * m21) * scale, (m00 * m11 - m01 * m10) * scale}};
+  const MatchLane(&A)[6] = r.A;
+  const MatchLane m00 = 1.0 + A[0] * C[0] + A[1] * C[1] + A[2] * C[2],
+                  m01 = A[0] * C[1] + A[1] * C[3] + A[2] * C[4],
+                  m02 = A[0] * C[2] + A[1] * C[4] + A[2] * C[5],
+                  m10 = A[1] * C[0] + A[3] * C[1] + A[4] * C[2],
+                  m11 = 1.0 + A[1] * C[1] + A[3] * C[3] + A[4] * C[4],
+                  m12 = A[1] * C[2] + A[3] * C[4] + A[4] * C[5],
+                  m20 = A[2] * C[0] + A[4] * C[1] + A[5] * C[2],
+                  m21 = A[2] * C[1] + A[4] * C[3] + A[5] * C[4],
+                  m22 = 1.0 + A[2] * C[2] + A[4] * C[4] + A[5] * C[5];
+  const MatchLane c00 = m11 * m22 - m12 * m21, c01 = m12 * m20 - m10 * m22, c02 = m10 * m21 - m11 * m20;
+  const MatchLane scale = 1.0 / (m00 * c00 + m01 * c01 + m02 * c02);
+  const MatchLane G[3][3] = {{c00 * scale, (m02 * m21 - m01 * m22) * scale, (m01 * m12 - m02 * m11) * scale},
+                             {c01 * scale, (m00 * m22 - m02 * m20) * scale, (m02 * m10 - m00 * m12) * scale},
+                             {c02 * scale, (m01 * m20 - m00 * m21) * scale, (m00 * m11 - m01 * m10) * scale}};
   for (int i = 0; i < 3; ++i) s.gradient[i] = G[i][0] * r.b[0] + G[i][1] * r.b[1] + G[i][2] * r.b[2];
   s.information[0] = G[0][0] * A[0] + G[0][1] * A[1] + G[0][2] * A[2];
   s.information[1] = G[0][0] * A[1] + G[0][1] * A[3] + G[0][2] * A[4];
@@ -168,20 +170,20 @@ struct alignas(Lane) StereoResidual {
   s.information[3] = G[1][0] * A[1] + G[1][1] * A[3] + G[1][2] * A[4];
   s.information[4] = G[1][0] * A[2] + G[1][1] * A[4] + G[1][2] * A[5];
   s.information[5] = G[2][0] * A[2] + G[2][1] * A[4] + G[2][2] * A[5];
-  const Lane(&g)[3] = s.gradient;
+  const MatchLane(&g)[3] = s.gradient;
   s.chi_squared = r.squares - r.b[0] * (C[0] * g[0] + C[1] * g[1] + C[2] * g[2]) -
                   r.b[1] * (C[1] * g[0] + C[3] * g[1] + C[4] * g[2]) -
                   r.b[2] * (C[2] * g[0] + C[4] * g[1] + C[5] * g[2]);
 }
 
-using LaneMask = decltype(Lane{} < Lane{});
+using LaneMask = decltype(MatchLane{} < MatchLane{});
 
 /// Keeps the lanes of `seen` whose point is in front of a camera and no farther off its axis than any pinhole
 /// image reaches: beside the camera, derivatives grow until the differences in (2) to (4) are all rounding.
-[[gnu::always_inline]] inline void keep_in_sight(const Lane (&p)[3], double nearest,
+[[gnu::always_inline]] inline void keep_in_sight(const MatchLane (&p)[3], double nearest,
                                                  LaneMask& seen) noexcept {
   constexpr double widest = 10;  // tangent of 84 degrees
-  const Lane reach = widest * p[2];
+  const MatchLane reach = widest * p[2];
   seen &= (p[2] > nearest) & (p[0] < reach) & (-p[0] < reach) & (p[1] < reach) & (-p[1] < reach);
 }
 
@@ -189,9 +191,9 @@ using LaneMask = decltype(Lane{} < Lane{});
 /// above it, and gradient and information are not computed: most wrong matches need no more than that.
 [[gnu::always_inline]] inline bool evaluate(const MatchLanes& m, const StereoView& view, double gate,
                                             StereoStatistics& s) noexcept {
-  Lane p[3], q[3];
+  MatchLane p[3], q[3];
   for (int i = 0; i < 3; ++i) s.y[i] = m.landmark[i] - view.camera[i];
-  const Lane *L = view.left, *R = view.right, *y = s.y;
+  const MatchLane *L = view.left, *R = view.right, *y = s.y;
   for (int i = 0; i < 3; ++i) {
     p[i] = y[0] * L[3 * i] + y[1] * L[3 * i + 1] + y[2] * L[3 * i + 2];
     q[i] = y[0] * R[3 * i] + y[1] * R[3 * i + 1] + y[2] * R[3 * i + 2] + view.t_right_left[i];
@@ -199,14 +201,14 @@ using LaneMask = decltype(Lane{} < Lane{});
   LaneMask seen = m.usable > 0.0;
   keep_in_sight(p, view.nearest, seen);
   keep_in_sight(q, view.nearest, seen);
-  const Lane one = {1, 1, 1, 1}, infinite = one / 0.0;
+  const MatchLane one = {1, 1, 1, 1}, infinite = one / 0.0;
   p[2] = seen ? p[2] : one;
   q[2] = seen ? q[2] : one;
   StereoResidual r{};
   add_pixels(m.left, view.left, p, r);
   add_pixels(m.right, view.right, q, r);
   // The residual's covariance is at most (1 + trace A trace C) I.
-  const Lane least = r.squares / (1.0 + (r.A[0] + r.A[3] + r.A[5]) * m.spread);
+  const MatchLane least = r.squares / (1.0 + (r.A[0] + r.A[3] + r.A[5]) * m.spread);
   s.chi_squared = seen ? least : infinite;
   const auto near = s.chi_squared < gate;
   if ((near[0] | near[1] | near[2] | near[3]) == 0) return false;
@@ -245,7 +247,7 @@ inline void whiten(const NormalisedWithJacobian& n, double sigma, std::size_t la
 inline void prepare(const StereoMatch& m, std::size_t index, const StereoRig& rig, bool right_rows,
                     MatchLanes& lanes) {
   check_match(m, index);
-  const std::size_t lane = index % lane_count;
+  const std::size_t lane = index % match_lanes;
   for (int i = 0; i < 3; ++i) lanes.landmark[i][lane] = m.landmark(i);
   for (int i = 0, k = 0; i < 3; ++i)
     for (int j = i; j < 3; ++j, ++k)

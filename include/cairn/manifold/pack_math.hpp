@@ -6,8 +6,8 @@
 ///
 /// sin and cos reduce by multiples of pi/2 held in two parts and use the minimax polynomials of fdlibm (Sun
 /// Microsystems 1993); atan2 uses the rational approximation of the Cephes library (S. Moshier 1989) on
-/// [-tan(pi/8), tan(pi/8)]. Errors are below 2.5 ulp. Arguments beyond 1e5, packs of other types than double and
-/// other targets go number by number through <cmath>. NaN and infinity give NaN.
+/// [-tan(pi/8), tan(pi/8)]. Errors are below 2.5 ulp. Arguments beyond 1e5, packs of other types than double
+/// and other targets go number by number through <cmath>. NaN and infinity give NaN.
 #pragma once
 
 #include <cmath>
@@ -97,7 +97,8 @@ template <int W>
 template <class S, int W>
 [[gnu::always_inline]] inline Pack<S, W> sqrt(const Pack<S, W>& a) {
 #if defined(__AVX512F__)
-  if constexpr (std::is_same_v<S, double> && W == 8) return Pack<S, W>::of(_mm512_maskz_sqrt_pd(0xff, a.lanes));
+  if constexpr (std::is_same_v<S, double> && W == 8)
+    return Pack<S, W>::of(_mm512_maskz_sqrt_pd(0xff, a.lanes));
 #endif
 #if defined(__AVX__)
   if constexpr (std::is_same_v<S, double> && W == 4) return Pack<S, W>::of(_mm256_sqrt_pd(a.lanes));
