@@ -95,7 +95,7 @@ template <int N, class Q, class S>
 
 /// Which registers of a column of a structured matrix hold anything beyond the ones of the diagonal.
 template <class A, int Width>
-[[nodiscard]] consteval bool holds_entries(int column, int lane) {
+[[nodiscard]] constexpr bool holds_entries(int column, int lane) {
   for (const Entry& entry : A::entries)
     if (entry.column == column && entry.row / Width == lane && (entry.row != entry.column || entry.slot >= 0))
       return true;
@@ -104,7 +104,7 @@ template <class A, int Width>
 
 /// Row i of A has a '1' on the diagonal for every i: most transitions are I + something.
 template <class A>
-[[nodiscard]] consteval bool unit_diagonal() {
+[[nodiscard]] constexpr bool unit_diagonal() {
   int ones = 0;
   for (const Entry& entry : A::entries) ones += entry.row == entry.column && entry.slot < 0 ? 1 : 0;
   return ones == A::row_count && ones == A::column_count;
@@ -112,7 +112,7 @@ template <class A>
 
 /// No entry of A below its diagonal.
 template <class A>
-[[nodiscard]] consteval bool upper_triangular() {
+[[nodiscard]] constexpr bool upper_triangular() {
   if constexpr (is_structured<A>) {
     for (const Entry& entry : A::entries)
       if (entry.row > entry.column) return false;
