@@ -78,9 +78,9 @@ struct PatchFilter {
 
 private:
   /// Gauss-Newton over u, x = mean + L u: the minimum, the information A there and what the frame brought.
-  template <FramePlacement Placement, int n, class Linearise>
-  void minimise(const typename Placement::State& mean, const Matrix<n>& L, const Placement& where,
-                const Linearise& linearise, Vector<n>& u, Matrix<n>& A, PatchUpdate& result) const;
+  template <FramePlacement Placement, int N, class Linearise>
+  void minimise(const typename Placement::State& mean, const Matrix<N>& L, const Placement& where,
+                const Linearise& linearise, Vector<N>& u, Matrix<N>& A, PatchUpdate& result) const;
 };
 
 template <FramePlacement Placement, FieldInterpolant Map>
@@ -118,11 +118,11 @@ PatchUpdate PatchFilter::update(Gaussian<typename Placement::State>& belief, con
   return result;
 }
 
-template <FramePlacement Placement, int n, class Linearise>
-void PatchFilter::minimise(const typename Placement::State& mean, const Matrix<n>& L, const Placement& where,
-                           const Linearise& linearise, Vector<n>& u, Matrix<n>& A,
+template <FramePlacement Placement, int N, class Linearise>
+void PatchFilter::minimise(const typename Placement::State& mean, const Matrix<N>& L, const Placement& where,
+                           const Linearise& linearise, Vector<N>& u, Matrix<N>& A,
                            PatchUpdate& result) const {
-  Vector<n> best = u = Vector<n>::Zero();  // x = m + L u: where to look next, and the least cost so far
+  Vector<N> best = u = Vector<N>::Zero();  // x = m + L u: where to look next, and the least cost so far
   double least = std::numeric_limits<double>::infinity();
   PatchGram frame;
   for (bool done = false; !done && result.iterations < iterations;) {
@@ -143,9 +143,9 @@ void PatchFilter::minimise(const typename Placement::State& mean, const Matrix<n
     result.samples = frame.samples;
     result.residual = frame.squares / static_cast<double>(frame.samples);
     result.gain = frame.gain;
-    const Matrix<n> M = Matrix<n>::Identity() + A;
+    const Matrix<N> M = Matrix<N>::Identity() + A;
     u = M.llt().solve(J.transpose() * frame.gradient + A * best);  // (1)
-    const Vector<n> step = u - best;
+    const Vector<N> step = u - best;
     done = step.dot(M * step) < tolerance * tolerance;
   }
 }

@@ -166,7 +166,7 @@ private:
     const Matrix<3> R_after = motion_.rotation().matrix().transpose();
     Linearised result;
     result.J_shared.setZero();
-    for (int moment = 0; moment < 2; ++moment) {
+    for (const std::size_t moment : {0U, 1U}) {
       Vector<3> p = track.point;
       Matrix<3> by_point = Matrix<3>::Identity();
       Matrix<3, 6> by_motion = Matrix<3, 6>::Zero();
@@ -178,10 +178,10 @@ private:
       const Vector<3> q = R.transpose() * (p - baseline);
       Matrix<3, 5> by_correction;
       by_correction << skew(q), -rig_.nominal().baseline() * (R.transpose() * rig_.direction_jacobian());
-      const auto left = whitened(track.views[static_cast<std::size_t>(2 * moment)], p);
-      const auto right = whitened(track.views[static_cast<std::size_t>(2 * moment + 1)], q);
+      const auto left = whitened(track.views[2 * moment], p);
+      const auto right = whitened(track.views[2 * moment + 1], q);
       if (!left || !right) return std::nullopt;
-      const int row = 4 * moment;
+      const int row = moment == 0 ? 0 : 4;
       result.residual.segment<2>(row) = left->first;
       result.residual.segment<2>(row + 2) = right->first;
       result.J_point.middleRows<2>(row) = left->second * by_point;

@@ -169,21 +169,21 @@ template <std::size_t... Q>
 
 /// All points for a group of queries: panels of points that fit the second-level cache, tiles of queries.
 /// `packed` has room for the group's coordinates, filled up to whole tiles.
-template <std::size_t tile>
+template <std::size_t Tile>
 [[gnu::always_inline]] inline void match_group(const PackedPoints& points, std::span<BulkQuery> queries,
                                                float* packed) {
   constexpr std::size_t panel_bytes = 256 * 1024;
   const std::size_t dim = points.dimension();
   const std::size_t panel = std::max<std::size_t>(1, panel_bytes / (block_size * sizeof(float) * dim));
-  for (std::size_t q = 0; q < (queries.size() + tile - 1) / tile * tile; ++q)
+  for (std::size_t q = 0; q < (queries.size() + Tile - 1) / Tile * Tile; ++q)
     for (std::size_t a = 0; a < dim; ++a)
-      packed[q / tile * tile * dim + a * tile + q % tile] = queries[std::min(q, queries.size() - 1)].row[a];
+      packed[q / Tile * Tile * dim + a * Tile + q % Tile] = queries[std::min(q, queries.size() - 1)].row[a];
   for (std::size_t begin = 0; begin < points.blocks(); begin += panel) {
     const std::size_t end = std::min(points.blocks(), begin + panel);
-    for (std::size_t q = 0; q < queries.size(); q += tile)
+    for (std::size_t q = 0; q < queries.size(); q += Tile)
       for (std::size_t block = begin; block < end; ++block)
-        match_tile(points, block, packed + q * dim, queries.subspan(q, std::min(tile, queries.size() - q)),
-                   std::make_index_sequence<tile>());
+        match_tile(points, block, packed + q * dim, queries.subspan(q, std::min(Tile, queries.size() - q)),
+                   std::make_index_sequence<Tile>());
   }
 }
 
