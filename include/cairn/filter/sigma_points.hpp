@@ -48,9 +48,14 @@ struct Transformed {
   Matrix<N, dof<Y>, ScalarOf<Y>> cross;
 };
 
+/// State and image of f have sizes known at compile time.
+template <class X, class F>
+inline constexpr bool fixed_sizes =
+    dof<X> != dynamic && dof<std::decay_t<std::invoke_result_t<const F&, const X&>>> != dynamic;
+
 /// Carries the points of N(x, root root^T) through f. `c2` is the spread squared.
 template <Manifold X, class F>
-  requires(dof<X> != dynamic)
+  requires fixed_sizes<X, F>
 [[nodiscard]] auto unscented_transform(const X& x, const CovarianceOf<X>& root, const F& f, double c2,
                                        double beta_minus_alpha2) {
   using S = ScalarOf<X>;
@@ -72,9 +77,8 @@ template <Manifold X, class F>
   return out;
 }
 
-/// The same for sizes known at run time.
+/// The same where a size is known at run time only.
 template <Manifold X, class F>
-  requires(dof<X> == dynamic)
 [[nodiscard]] auto unscented_transform(const X& x, const CovarianceOf<X>& root, const F& f, double c2,
                                        double beta_minus_alpha2) {
   using S = ScalarOf<X>;
