@@ -27,10 +27,7 @@ template <int Size, class Body>
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC unroll 16
 #endif
-    for (int i = first; i < last; ++i) {
-      if (i >= Size) __builtin_unreachable();  // else gcc 12 warns of the bodies that it wrote out beyond
-      body(i);
-    }
+    for (int i = first; i < last; ++i) body(i);
   } else {
     for (int i = first; i < last; ++i) body(i);
   }
