@@ -13,8 +13,6 @@ target_link_libraries(cairn_development INTERFACE cairn::cairn)
 target_compile_options(cairn_development INTERFACE
   -Wall -Wextra -Wconversion -Wshadow
   $<$<BOOL:${CAIRN_WARNINGS_AS_ERRORS}>:-Werror>
-  # What gcc 12 guesses after inlining and unrolling vector code is often false: shown, but not fatal.
-  $<$<CXX_COMPILER_ID:GNU>:-Wno-error=array-bounds;-Wno-error=stringop-overflow;-Wno-error=maybe-uninitialized>
   $<$<BOOL:${CAIRN_NATIVE}>:-march=native>
   # gcc 12's own AVX-512 intrinsics, inlined into Eigen, read "undefined" registers (gcc bug 105593).
   $<$<AND:$<BOOL:${CAIRN_NATIVE}>,$<CXX_COMPILER_ID:GNU>>:-Wno-uninitialized;-Wno-maybe-uninitialized>)

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <ctime>
 #include <functional>
 #include <optional>
 #include <span>
@@ -157,14 +156,9 @@ std::vector<float> first_half(const std::vector<float>& rows) {
 
 /// Seconds that all threads of the process were running during a call.
 double running_seconds_of(const std::function<void()>& run) {
-  const auto running = [] {
-    timespec now{};
-    clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
-    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-  };
-  const double begin = running();
+  const double begin = running_seconds(Running::process);
   run();
-  return running() - begin;
+  return running_seconds(Running::process) - begin;
 }
 
 void score_threads(Scoreboard& board, const std::vector<float>& base, const std::vector<float>& queries) {

@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <ctime>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -31,14 +30,9 @@ struct Elapsed {
 };
 
 Elapsed elapsed_of(const std::function<void()>& run) {
-  const auto running = [] {
-    timespec now{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-  };
-  const double begin = running();
+  const double begin = running_seconds(Running::thread);
   const double wall = seconds_of(run);
-  return {wall, running() - begin};
+  return {wall, running_seconds(Running::thread) - begin};
 }
 
 /// A growing map: what the insertion of a step took, and its queries.

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstddef>
+#include <ctime>
 
 #include <cairn/core/check.hpp>
 
@@ -42,6 +43,12 @@ double seconds_of(const std::function<void()>& run) {
   const auto start = std::chrono::steady_clock::now();
   run();
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+double running_seconds(Running whose) {
+  timespec now{};
+  clock_gettime(whose == Running::thread ? CLOCK_THREAD_CPUTIME_ID : CLOCK_PROCESS_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
 std::vector<Timing> interleave(const std::vector<Contender>& contenders, const InterleaveOptions& options) {

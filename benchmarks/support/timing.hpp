@@ -57,6 +57,12 @@ double ratio(const Timing& slow, const Timing& fast);
 /// Seconds that one call takes.
 double seconds_of(const std::function<void()>& run);
 
+/// Whose running is counted: of the calling thread, or of all threads of the process.
+enum class Running { thread, process };
+
+/// Seconds so far in which they were running, which a busy machine does not stretch as it does wall time.
+double running_seconds(Running whose);
+
 /// Middle value; the mean of the middle two for an even count, and 0 for none.
 double median_of(std::vector<double> values);
 

@@ -4,20 +4,19 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <limits>
 #include <span>
 
 #include <cairn/core/random.hpp>
 
+#include "support/timing.hpp"
+
 namespace cairn_study {
 namespace {
 
-/// CPU time of this thread: on a machine with other work the wall clock says little.
+/// On a machine with other work the wall clock says little.
 double cpu_seconds() {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  return cairn_bench::running_seconds(cairn_bench::Running::thread);
 }
 
 double distance(const float* a, const float* b, std::size_t dim) {

@@ -27,7 +27,10 @@ template <int Size, class Body>
 #if defined(__GNUC__) && !defined(__clang__)
 #pragma GCC unroll 16
 #endif
-    for (int i = first; i < last; ++i) body(i);
+    for (int i = first; i < last; ++i) {
+      if (i >= Size) __builtin_unreachable();  // else gcc 12 warns of the bodies it wrote out and never runs
+      body(i);
+    }
   } else {
     for (int i = first; i < last; ++i) body(i);
   }

@@ -133,7 +133,7 @@ template <bool Triangular, int N, class S>
       for (int lane = 0; lane < top; ++lane) products.lanes[lane] += w[k].lanes[lane] * factor;
     };
     each<N>(first, N, accumulate);
-    each<N>(N + j, 2 * N, accumulate);
+    each<N>(j, N, [&](int k) __attribute__((always_inline)) { accumulate(N + k); });
     const S length = products[j];
     diagonal[j] = length;
     u[j].set_zero();
@@ -145,7 +145,7 @@ template <bool Triangular, int N, class S>
         for (int lane = 0; lane < top; ++lane) w[k].lanes[lane] -= products.lanes[lane] * factor;
       };
       each<N>(first, N, reduce);
-      each<N>(N + j, 2 * N, reduce);
+      each<N>(j, N, [&](int k) __attribute__((always_inline)) { reduce(N + k); });
     }
     cut_below(u[j], j);
   });
