@@ -24,14 +24,16 @@ template <int M, class S>
   using std::sqrt;
   bool good = true;
   S raw[M][M];
-  each<M>([&](int i) { each<M>(0, i + 1, [&](int j) { raw[i][j] = a(i, j); }); });
-  each<M>([&](int j) {
+  each<M>([&](int i)
+              __attribute__((always_inline)) { each<M>(0, i + 1, [&](int j) { raw[i][j] = a(i, j); }); });
+  each<M>([&](int j) __attribute__((always_inline)) {
     good = good && raw[j][j] > S(0) && raw[j][j] <= std::numeric_limits<S>::max();
     const S inverse = S(1) / raw[j][j];
     inverse_root[j] = sqrt(inverse);
     each<M>(j + 1, M, [&](int i) { lower[i][j] = raw[i][j] * inverse; });
-    each<M>(j + 1, M,
-            [&](int i) { each<M>(j + 1, i + 1, [&](int k) { raw[i][k] -= lower[i][j] * raw[k][j]; }); });
+    each<M>(j + 1, M, [&](int i) __attribute__((always_inline)) {
+      each<M>(j + 1, i + 1, [&](int k) { raw[i][k] -= lower[i][j] * raw[k][j]; });
+    });
   });
   return good;
 }
@@ -48,7 +50,7 @@ struct Correction {
   [[gnu::always_inline]] [[nodiscard]] bool fill(const Matrix<M, M, S>& covariance,
                                                  Column<N, S> (&cross)[M]) {
     const bool good = factor(covariance, lower, inverse_root);
-    each<M>([&](int j) {
+    each<M>([&](int j) __attribute__((always_inline)) {
       each<M>(0, j, [&](int k) { cross[j].subtract(cross[k], lower[j][k]); });
       w[j] = cross[j];
       w[j].scale(inverse_root[j]);
@@ -72,7 +74,7 @@ struct Correction {
   /// Residual in units of its standard deviations, independent of one another: y = D^-1/2 L^-1 r.
   [[gnu::always_inline]] void whiten(const S* r, S* y) const {
     S raw[M];
-    each<M>([&](int j) {
+    each<M>([&](int j) __attribute__((always_inline)) {
       raw[j] = r[j];
       each<M>(0, j, [&](int k) { raw[j] -= lower[j][k] * raw[k]; });
     });

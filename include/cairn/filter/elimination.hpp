@@ -26,7 +26,7 @@ template <int N, class S, class Keep>
   S diagonal[N];
   each<N>([&](int j) { diagonal[j] = columns[j][j]; });
   bool good = true;
-  each<N>([&](int j) {
+  each<N>([&](int j) __attribute__((always_inline)) {
     const S pivot = columns[j][j];
     const S floor = slack * diagonal[j];
     if (!(pivot > floor)) [[unlikely]] {  // NaN, negative, or a direction without uncertainty
@@ -60,7 +60,7 @@ template <int N, class S, class Keep>
   S diagonal[N];
   each<N>([&](int j) { diagonal[j] = columns[j][j]; });
   bool regular = true;
-  each<N>([&](int j) {
+  each<N>([&](int j) __attribute__((always_inline)) {
     const S pivot = columns[j][j];
     regular &= pivot > slack * diagonal[j];
     keep(j, columns[j], pivot);

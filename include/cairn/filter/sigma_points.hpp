@@ -70,7 +70,7 @@ template <Manifold X, class F>
   Tangent<Y> mean;
   moments.mean.store(mean.data());
   out.mean = retract(center, mean);
-  each<m>([&](int b) {
+  each<m>([&](int b) __attribute__((always_inline)) {
     moments.covariance[b].store(out.covariance.data() + b * m);
     moments.cross[b].store(out.cross.data() + b * n);
   });

@@ -107,10 +107,10 @@ struct UDFilter {
     detail::load_columns(belief.upper, u);
     d.load(belief.diagonal.data());
     step.set_zero();
-    detail::each<n>([&](int j) {  // S += (H u_j) d_j (H u_j)^T
+    detail::each<n>([&](int j) __attribute__((always_inline)) {  // S += (H u_j) d_j (H u_j)^T
       S seen[m];
       detail::each<m>([&](int i) { seen[i] = row_dot(jacobian, i, u[j]); });
-      detail::each<m>([&](int b) {
+      detail::each<m>([&](int b) __attribute__((always_inline)) {
         detail::each<m>(b, m, [&](int a) { in.covariance(a, b) += seen[a] * (seen[b] * d[j]); });
       });
     });

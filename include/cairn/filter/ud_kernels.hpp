@@ -75,7 +75,7 @@ template <class Q, int N, class S>
   S original[N];
   each<N>([&](int j) { original[j] = a[j][j]; });
   bool good = true;
-  each<N>([&](int back) {
+  each<N>([&](int back) __attribute__((always_inline)) {
     const int j = N - 1 - back;
     const S pivot = a[j][j];
     const bool regular = pivot > slack * original[j];
@@ -88,7 +88,7 @@ template <class Q, int N, class S>
     each<N>(0, j, [&](int i) {
       if (holds(i, j)) column[i] = a[j][i] * inverse;
     });
-    each<N>(0, j, [&](int i) {
+    each<N>(0, j, [&](int i) __attribute__((always_inline)) {
       each<N>(0, i + 1, [&](int k) {
         if (holds(i, j) && holds(k, j)) a[i][k] -= column[i] * a[j][k];
       });
@@ -122,7 +122,7 @@ template <bool Triangular, int N, class S>
                                                          Column<N, S> (&u)[N], Column<N, S>& d) {
   constexpr int width = Column<N, S>::width;
   S diagonal[N];
-  each<N>([&](int back) {
+  each<N>([&](int back) __attribute__((always_inline)) {
     const int j = N - 1 - back;
     const int top = j / width + 1;  // registers that hold rows up to j
     const int first = Triangular ? j : 0;

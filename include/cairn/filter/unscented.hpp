@@ -161,7 +161,7 @@ struct Unscented {
       Innovation<m, S> in;
       in.residual = local(Z(retract(center, mean)), z);
       const Matrix<m, m, S> r = detail::dense_of(sensor.noise(belief.mean));
-      detail::each<m>([&](int b) {
+      detail::each<m>([&](int b) __attribute__((always_inline)) {
         detail::each<m>(b, m, [&](int a) {
           in.covariance(a, b) = in.covariance(b, a) = moments.covariance[b][a] + r(a, b);
         });
