@@ -6,6 +6,7 @@
 #include <cmath>
 #include <utility>
 
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/parallel.hpp>
 #include <cairn/core/random.hpp>
@@ -91,8 +92,8 @@ Run fly_once(const StraightFlight& flight, const cairn::PatchNoise& noise, cairn
     if (!filter.update(belief, where, ground.map, flight.shape, z, noise, scratch).accepted()) ++run.refused;
     if (const auto information =
             filter.information(truth, where, ground.truth, flight.shape, noise, scratch)) {
-      const cairn::Matrix<5> prior = bound.covariance.llt().solve(cairn::Matrix<5>::Identity());
-      bound.covariance = (prior + *information).llt().solve(cairn::Matrix<5>::Identity());
+      const cairn::Matrix<5> prior = cairn::Cholesky<5>(bound.covariance).inverse();
+      bound.covariance = cairn::Cholesky<5>(prior + *information).inverse();
     }
     run.error.push_back(belief.mean - truth);
     run.variance.push_back(belief.covariance.diagonal());

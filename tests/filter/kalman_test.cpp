@@ -3,6 +3,7 @@
 #include <cmath>
 #include <limits>
 
+#include <Eigen/Cholesky>
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>

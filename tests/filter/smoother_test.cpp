@@ -5,6 +5,7 @@
 #include <cmath>
 #include <vector>
 
+#include <Eigen/Cholesky>
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 
+#include <Eigen/Cholesky>
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>

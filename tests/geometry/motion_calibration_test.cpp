@@ -4,6 +4,7 @@
 #include <limits>
 #include <vector>
 
+#include <Eigen/Cholesky>
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>

@@ -14,6 +14,8 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Cholesky>
+
 #include <cairn/geometry/stereo_pose.hpp>
 #include <cairn/geometry/triangulation.hpp>
 

@@ -4,12 +4,11 @@
 /// @file
 /// The only door to Eigen: the vector and matrix names that every other header uses.
 ///
-/// Only Eigen/Core and Eigen/Cholesky come in here. A header that needs another decomposition includes it
-/// itself (geometry/alignment.hpp takes Eigen/SVD), so that the price of #include stays with those who use
-/// it.
+/// Only Eigen/Core comes in here. A header that needs a decomposition of Eigen's includes it itself
+/// (field/patch_noise.hpp takes Eigen/Eigenvalues), so that the price of #include stays with those who use
+/// it; for symmetric matrices there is core/cholesky.hpp.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 
 #include <cairn/version.hpp>
@@ -32,6 +31,19 @@ template <class Derived>
 [[nodiscard]] auto symmetrised(const Eigen::MatrixBase<Derived>& a) {
   using Scalar = typename Derived::Scalar;
   return (Scalar(0.5) * (a + a.transpose())).eval();
+}
+
+/// to += weight a^T b. Plain loops: an expression of Eigen's of more than 8 rows takes its general product,
+/// which costs half a second of compiling for every shape. O(R C K).
+template <int R, int C, int K, class S>
+void add_transposed_product(Matrix<R, C, S>& to, const Matrix<K, R, S>& a, const Matrix<K, C, S>& b,
+                            S weight = S(1)) {
+  for (int c = 0; c < C; ++c)
+    for (int r = 0; r < R; ++r) {
+      S sum(0);
+      for (int k = 0; k < K; ++k) sum += a(k, r) * b(k, c);
+      to(r, c) += weight * sum;
+    }
 }
 
 /// Skew-symmetric matrix of w: skew(w) * v = w x v.

@@ -17,6 +17,7 @@
 #include <optional>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/manifold/manifold.hpp>
@@ -30,9 +31,9 @@ template <class E, class P>
                                                        const Eigen::MatrixBase<P>& covariance) {
   CAIRN_EXPECTS(e.cols() == 1 && covariance.rows() == e.rows() && covariance.cols() == e.rows(),
                 "normalised_squared needs a vector and a square matrix of its size");
-  const auto factor = covariance.eval().llt();
-  if (factor.info() != Eigen::Success) return std::nullopt;
-  const double value = static_cast<double>(factor.matrixL().solve(e).squaredNorm());
+  const Cholesky<P::RowsAtCompileTime, typename P::Scalar> factor(covariance);
+  if (!factor.good()) return std::nullopt;
+  const double value = static_cast<double>(factor.whiten(e).squaredNorm());
   if (!std::isfinite(value)) return std::nullopt;
   return value;
 }

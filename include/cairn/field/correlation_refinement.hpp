@@ -22,6 +22,7 @@
 #include <optional>
 #include <span>
 
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/field/patch.hpp>
 #include <cairn/field/patch_gram.hpp>
@@ -142,11 +143,10 @@ std::optional<RefinedPlacement> refined_placement(const Map& map, const PatchSha
     Vector<5> gradient = at.jacobian.transpose() * frame.gradient / variance;
     normal.diagonal().tail<3>().array() += 1.0;
     gradient.tail<3>() -= theta.tail<3>();
-    const Eigen::LLT<Matrix<5>> factor(normal);
-    if (factor.info() != Eigen::Success || !(factor.rcond() > 1e-13)) return std::nullopt;
+    const Cholesky<5> factor(normal);
+    if (!factor.good() || !(factor.least_share() > 1e-13)) return std::nullopt;
     const Vector<5> step = factor.solve(gradient);
-    result = RefinedPlacement{at.placement,
-                              symmetrised(factor.solve(Matrix<5>::Identity()).topLeftCorner<2, 2>())};
+    result = RefinedPlacement{at.placement, factor.inverse().topLeftCorner<2, 2>()};
     if (step.dot(normal * step) < small * small) break;
     theta += step;
   }

@@ -25,6 +25,7 @@
 #include <span>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/field/patch.hpp>
 #include <cairn/field/patch_gram.hpp>
@@ -91,9 +92,9 @@ using PackedBelief = Vector<N + N * N>;
 
 template <int N>
 bool pack_belief(const Gaussian<Vector<N>>& belief, PackedBelief<N>& y) {
-  const Eigen::LLT<Matrix<N>> prior(belief.covariance);
-  if (prior.info() != Eigen::Success) return false;
-  y << belief.mean, prior.solve(Matrix<N>::Identity()).reshaped();
+  const Cholesky<N> prior(belief.covariance);
+  if (!prior.good()) return false;
+  y << belief.mean, prior.inverse().reshaped();
   return true;
 }
 
@@ -101,10 +102,10 @@ bool pack_belief(const Gaussian<Vector<N>>& belief, PackedBelief<N>& y) {
 template <int N>
 bool unpack_belief(const PackedBelief<N>& y, Gaussian<Vector<N>>& belief) {
   const Matrix<N> sigma = symmetrised(y.template tail<N * N>().reshaped(N, N));
-  const Eigen::LLT<Matrix<N>> posterior(sigma);
-  if (posterior.info() != Eigen::Success) return false;
+  const Cholesky<N> posterior(sigma);
+  if (!posterior.good()) return false;
   belief.mean = y.template head<N>();
-  belief.covariance = symmetrised(posterior.solve(Matrix<N>::Identity()));
+  belief.covariance = posterior.inverse();
   return true;
 }
 
@@ -172,9 +173,9 @@ PatchVerdict PatchBucy::integrate(Gaussian<typename Placement::State>& belief, c
   const auto slope = [&](double time, const Packed& at, Packed& result) {
     const Vector<N> x = at.template head<N>();
     const Matrix<N> sigma = at.template tail<N * N>().reshaped(N, N);
-    const Eigen::LLT<Matrix<N>> factor(sigma);
+    const Cholesky<N> factor(sigma);
     PatchGram frame;
-    verdict = !at.allFinite() || factor.info() != Eigen::Success
+    verdict = !at.allFinite() || !factor.good()
                   ? PatchVerdict::not_positive_definite
                   : PatchLinearisation{}.gram(map, shape, where.placement(x), frame_at(time), noise, scratch,
                                               frame);

@@ -20,6 +20,7 @@
 #include <span>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/field/patch.hpp>
 #include <cairn/field/patch_gram.hpp>
@@ -95,10 +96,10 @@ PatchUpdate PatchFilter::update(Gaussian<typename Placement::State>& belief, con
   if (!belief.mean.allFinite() || !belief.covariance.allFinite()) return result;
   for (const double value : z)
     if (!std::isfinite(value)) return result;
-  const Eigen::LLT<Matrix<n>> root(belief.covariance);
+  const Cholesky<n> root(belief.covariance);
   result.verdict = PatchVerdict::not_positive_definite;
-  if (root.info() != Eigen::Success) return result;
-  const Matrix<n> L = root.matrixL();
+  if (!root.good()) return result;
+  const Matrix<n>& L = root.lower();
   Vector<n> u;
   Matrix<n> A;
   const auto linearise = [&](const typename Placement::State& x, PatchGram& frame) {
@@ -114,7 +115,7 @@ PatchUpdate PatchFilter::update(Gaussian<typename Placement::State>& belief, con
   if (!result.accepted()) return result;
   const Matrix<n> M = Matrix<n>::Identity() + A;
   belief.mean += L * u;
-  belief.covariance = symmetrised(L * M.llt().solve(Matrix<n>(L.transpose())));  // (2)
+  belief.covariance = symmetrised(L * Cholesky<n>(M).solve(Matrix<n>(L.transpose())));  // (2)
   return result;
 }
 
@@ -144,7 +145,7 @@ void PatchFilter::minimise(const typename Placement::State& mean, const Matrix<N
     result.residual = frame.squares / static_cast<double>(frame.samples);
     result.gain = frame.gain;
     const Matrix<N> M = Matrix<N>::Identity() + A;
-    u = M.llt().solve(J.transpose() * frame.gradient + A * best);  // (1)
+    u = Cholesky<N>(M).solve(J.transpose() * frame.gradient + A * best);  // (1)
     const Vector<N> step = u - best;
     done = step.dot(M * step) < tolerance * tolerance;
   }

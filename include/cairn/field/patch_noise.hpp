@@ -14,6 +14,7 @@
 #pragma once
 
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 
 #include <Eigen/Eigenvalues>
@@ -36,7 +37,9 @@ public:
 
   /// White noise of `variance` and a map error of `map_variance` whose correlation over a distance d is
   /// exp(-alpha^2 d^2); scales are the distances between samples along and across track. O(N^3 + M^3) once.
-  PatchNoise(double variance, const PatchShape& shape, double map_variance, double alpha, double scale_along,
+  /// A template so that only those who call it compile the eigenvectors.
+  template <std::same_as<double> Real = double>
+  PatchNoise(Real variance, const PatchShape& shape, double map_variance, double alpha, double scale_along,
              double scale_across)
       : PatchNoise(variance) {
     CAIRN_EXPECTS(map_variance >= 0.0 && alpha > 0.0 && scale_along > 0.0 && scale_across > 0.0,

@@ -8,6 +8,7 @@
 /// (D. Simon, "Kalman filtering with state constraints", IET Control Theory and Applications 4, 2010, 2.4.)
 #pragma once
 
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/status.hpp>
@@ -27,10 +28,10 @@ Status constrain(Gaussian<X>& belief, const Matrix<K, dof<X>, ScalarOf<X>>& d,
     return Status::not_finite;
   const Matrix<n, K, S> pd = belief.covariance * d.transpose();
   const Matrix<K, K, S> s = symmetrised(d * pd);
-  const Eigen::LLT<Matrix<K, K, S>> root(s);
-  if (root.info() != Eigen::Success) return Status::not_positive_definite;
+  const Cholesky<K, S> root(s);
+  if (!root.good()) return Status::not_positive_definite;
   const Tangent<X> step = pd * root.solve(c);
-  Matrix<n, n, S> next = symmetrised(belief.covariance - pd * root.solve(pd.transpose()));
+  Matrix<n, n, S> next = symmetrised(belief.covariance - pd * root.solve(Matrix<K, n, S>(pd.transpose())));
   for (int i = 0; i < static_cast<int>(next.rows());
        ++i)  // what is now known exactly must not round below zero
     if (next(i, i) < S(0)) next(i, i) = S(0);

@@ -17,6 +17,7 @@
 #include <algorithm>
 #include <limits>
 
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/correction.hpp>
 #include <cairn/filter/elimination.hpp>
@@ -179,16 +180,16 @@ void correct_into(Candidate<N, M, S>& out, const Matrix<N, N, S>& prior, const M
   }
   const Matrix<N, M, S> ph = prior * h.transpose();
   in.covariance = symmetrised(h * ph + r);
-  const Eigen::LLT<Matrix<M, M, S>> root(in.covariance);
-  const Matrix<M, N, S> w = root.matrixL().solve(ph.transpose());  // S^-1/2 H P
-  const Vector<M, S> y = root.matrixL().solve(in.residual);
+  const Cholesky<M, S> root(in.covariance);
+  const Matrix<M, N, S> w = root.whiten(Matrix<M, N, S>(ph.transpose()));  // S^-1/2 H P
+  const Vector<M, S> y = root.whiten(in.residual);
   in.nis = y.squaredNorm();
-  bool good = root.info() == Eigen::Success && in.nis <= static_cast<S>(gate) && gate > 0.0 &&
-              in.nis <= std::numeric_limits<S>::max();
+  bool good =
+      root.good() && in.nis <= static_cast<S>(gate) && gate > 0.0 && in.nis <= std::numeric_limits<S>::max();
   if (good) {
     out.step = w.transpose() * y;
     if (form == Form::joseph) {
-      const Matrix<M, N, S> gain_t = root.matrixU().solve(w);
+      const Matrix<M, N, S> gain_t = root.unwhiten(w);
       Matrix<N, N, S> a = -gain_t.transpose() * h;
       a.diagonal().array() += S(1);
       out.covariance = symmetrised(a * prior * a.transpose() + gain_t.transpose() * r * gain_t);

@@ -16,6 +16,7 @@
 #include <limits>
 #include <optional>
 
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
@@ -40,18 +41,15 @@ struct InformationBelief {
   /// The same belief in information form; nothing where the covariance is singular.
   [[nodiscard]] static std::optional<InformationBelief> from(const Gaussian<X>& belief) {
     const int n = dof_of(belief.mean);
-    const Eigen::LLT<CovarianceOf<X>> root(belief.covariance);
-    if (root.info() != Eigen::Success) return std::nullopt;
-    return InformationBelief{belief.mean, symmetrised(root.solve(CovarianceOf<X>::Identity(n, n))),
-                             Tangent<X>::Zero(n)};
+    const Cholesky<dof<X>, ScalarOf<X>> root(belief.covariance);
+    if (!root.good()) return std::nullopt;
+    return InformationBelief{belief.mean, root.inverse(), Tangent<X>::Zero(n)};
   }
   /// Mean and covariance; nothing while some direction has no information.
   [[nodiscard]] std::optional<Gaussian<X>> gaussian() const {
-    const Eigen::LLT<CovarianceOf<X>> root(information);
-    if (root.info() != Eigen::Success) return std::nullopt;
-    const Tangent<X> d = root.solve(vector);
-    const int n = static_cast<int>(vector.size());
-    Gaussian<X> result{retract(point, d), symmetrised(root.solve(CovarianceOf<X>::Identity(n, n)))};
+    const Cholesky<dof<X>, ScalarOf<X>> root(information);
+    if (!root.good()) return std::nullopt;
+    Gaussian<X> result{retract(point, root.solve(vector)), root.inverse()};
     if (!detail::all_finite(result.covariance) || !detail::finite_state(result.mean)) return std::nullopt;
     return result;
   }
@@ -119,9 +117,9 @@ struct InformationFilter {
     const Tangent<X> y = kept * (inverse.transpose() * next.vector);
     const CovarianceOf<X> mg = m * g;
     const CovarianceOf<X> inner = CovarianceOf<X>::Identity(size, size) + g.transpose() * mg;
-    const Eigen::LLT<CovarianceOf<X>> root(inner);
-    if (root.info() != Eigen::Success) return Status::not_positive_definite;
-    next.information = symmetrised(m - mg * root.solve(mg.transpose()));
+    const Cholesky<n, S> root(inner);
+    if (!root.good()) return Status::not_positive_definite;
+    next.information = symmetrised(m - mg * root.solve(CovarianceOf<X>(mg.transpose())));
     next.vector = y - mg * root.solve(g.transpose() * y);
     next.point = process.propagate(next.point, control, dt);
     return keep(belief, next);
@@ -144,21 +142,21 @@ struct InformationFilter {
     const Matrix<m, m, S> r = sensor.noise(belief.point);
     const Vector<m, S> residual = local(Z(sensor.predict(belief.point)), z);
     if (h.cols() != belief.vector.size() || h.rows() != residual.size()) return Status::size_mismatch;
-    const Eigen::LLT<Matrix<m, m, S>> root(r);
-    if (root.info() != Eigen::Success || !detail::all_finite(r))
+    const Cholesky<m, S> root(r);
+    if (!root.good() || !detail::all_finite(r))
       return detail::all_finite(r) ? Status::not_positive_definite : Status::not_finite;
-    const Matrix<m, dof<X>, S> white = root.matrixL().solve(h);
+    const Matrix<m, dof<X>, S> white = root.whiten(h);
     InformationBelief<X> next = belief;
     next.information += white.transpose() * white;
-    next.vector += white.transpose() * root.matrixL().solve(residual);
+    next.vector += white.transpose() * root.whiten(residual);
     return keep(belief, next);
   }
 
   /// Moves the point of linearisation to the mean; false, and nothing changed, while that is unknown.
   template <Manifold X>
   static bool recentre(InformationBelief<X>& belief) {
-    const Eigen::LLT<CovarianceOf<X>> root(belief.information);
-    if (root.info() != Eigen::Success) return false;
+    const Cholesky<dof<X>, ScalarOf<X>> root(belief.information);
+    if (!root.good()) return false;
     const Tangent<X> d = root.solve(belief.vector);
     if (!detail::all_finite(d)) return false;
     belief.point = retract(belief.point, d);

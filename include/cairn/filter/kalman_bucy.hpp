@@ -23,6 +23,7 @@
 #include <concepts>
 #include <limits>
 
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/information.hpp>
@@ -96,7 +97,7 @@ struct KalmanBucy {
       const auto seen = look(sensor, x, z);
       const P a = process.rate_jacobian(x, control);
       const P ya = y * a;
-      const Tangent<X> pull = Eigen::LLT<P>(y).solve(seen.state);
+      const Tangent<X> pull = Cholesky<dof<X>, ScalarOf<X>>(y).solve(seen.state);
       return Rates<X>{process.rate(x, control) + pull,
                       P(seen.matrix - ya - ya.transpose() - y * process.spectral_density(x, control) * y)};
     };
@@ -121,9 +122,8 @@ private:
     const Matrix<m, dof<X>, S> h = detail::dense_of(sensor.jacobian(x));
     const Matrix<m, m, S> r = sensor.noise(x);
     const Vector<m, S> residual = local(Z(sensor.predict(x)), z);
-    const Eigen::LLT<Matrix<m, m, S>> root(r);
-    const S sound = root.info() == Eigen::Success ? S(1) : std::numeric_limits<S>::quiet_NaN();
-    return {sound * (h.transpose() * root.solve(residual)), sound * (h.transpose() * root.solve(h))};
+    const Cholesky<m, S> root(r);
+    return {h.transpose() * root.solve(residual), h.transpose() * root.solve(h)};
   }
 
   template <Manifold X, class Rate>

@@ -13,6 +13,7 @@
 #include <limits>
 #include <optional>
 
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/information.hpp>
@@ -36,8 +37,8 @@ template <int N, int M, class S>
                                                                const Matrix<N, N, S>& q,
                                                                const Matrix<M, M, S>& r) {
   const int n = static_cast<int>(f.rows());
-  const Eigen::LLT<Matrix<M, M, S>> root_r(r);
-  if (root_r.info() != Eigen::Success) return std::nullopt;
+  const Cholesky<M, S> root_r(r);
+  if (!root_r.good()) return std::nullopt;
   const Matrix<N, N, S> identity = Matrix<N, N, S>::Identity(n, n);
   Matrix<N, N, S> a = detail::transposed<N, N, S>(f);   // transition of the adjoint, 2^k steps
   Matrix<N, N, S> g = h.transpose() * root_r.solve(h);  // information of 2^k measurements
@@ -59,8 +60,8 @@ template <int N, int M, class S>
   }
   if (!settled) return std::nullopt;
   const Matrix<N, M, S> ph = p * h.transpose();
-  const Eigen::LLT<Matrix<M, M, S>> root_s(symmetrised(h * ph + r));
-  SteadyState<N, M, S> result{p, p, root_s.solve(ph.transpose()).transpose()};
+  const Cholesky<M, S> root_s(symmetrised(h * ph + r));
+  SteadyState<N, M, S> result{p, p, root_s.solve(Matrix<M, N, S>(ph.transpose())).transpose()};
   result.updated = symmetrised(p - result.gain * ph.transpose());
   return result;
 }

@@ -22,6 +22,7 @@
 #include <utility>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
@@ -217,7 +218,7 @@ inline void alignment_covariance(const AlignmentMoments& m, double scale, bool d
   result.information << m.weight * Matrix<3>::Identity(), -m.weight * lever, m.weight * lever,
       rotation - m.weight * lever * lever;
   if (!determined) return;
-  const Matrix<3> c = symmetrised(rotation.llt().solve(Matrix<3>::Identity()));
+  const Matrix<3> c = Cholesky<3>(rotation).inverse();
   Matrix<6> covariance;
   covariance << Matrix<3>::Identity() / m.weight - lever * c * lever, lever * c, -c * lever, c;
   result.covariance = symmetrised(covariance);

@@ -21,6 +21,7 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/geometry/motion_calibration.hpp>
@@ -191,7 +192,7 @@ private:
         information += weight * z.H * z.H.transpose();
         gradient += weight * z.value * z.H;
       }
-      state_ += information.llt().solve(gradient);
+      state_ += Cholesky<5>(information).solve(gradient);
     }
   }
 

@@ -26,6 +26,7 @@
 #include <utility>
 #include <vector>
 
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/geometry/pose_equations.hpp>
@@ -108,8 +109,8 @@ public:
     Matrix<shared> H;
     Vector<shared> g;
     gather(mean, information, gate, loss_scale, H, g);
-    const Eigen::LLT<Matrix<shared>> factor(H);
-    if (factor.info() != Eigen::Success) return std::nullopt;
+    const Cholesky<shared> factor(H);
+    if (!factor.good()) return std::nullopt;
     const Vector<shared> d = factor.solve(g);
     if (!d.allFinite()) return std::nullopt;
     for (Track& track : tracks_)
@@ -128,10 +129,9 @@ public:
     gather(state_, Matrix<5>::Zero(), gate, std::numeric_limits<double>::infinity(), H, g);
     H *= efficiency;
     H.bottomRightCorner<5, 5>() += information;
-    const Eigen::LLT<Matrix<shared>> factor(H);
-    if (factor.info() != Eigen::Success) return std::nullopt;
-    const Matrix<shared> inverse = factor.solve(Matrix<shared>::Identity());
-    const Matrix<5> result = symmetrised(Matrix<5>(inverse.bottomRightCorner<5, 5>()));
+    const Cholesky<shared> factor(H);
+    if (!factor.good()) return std::nullopt;
+    const Matrix<5> result = factor.inverse().bottomRightCorner<5, 5>();
     if (!result.allFinite()) return std::nullopt;
     return result;
   }
@@ -151,7 +151,7 @@ private:
     Vector<3> point;            // left camera before
     Matrix<3, shared> coupling = Matrix<3, shared>::Zero();
     Vector<3> gradient = Vector<3>::Zero();
-    Eigen::LLT<Matrix<3>> elimination{Matrix<3>(Matrix<3>::Identity())};
+    Cholesky<3> elimination{Matrix<3>::Identity()};
     double chi_squared = std::numeric_limits<double>::infinity();
   };
   struct Linearised {
@@ -219,19 +219,21 @@ private:
       track.chi_squared = std::numeric_limits<double>::infinity();
       const auto at = linearise(track, R, baseline);
       if (!at) continue;
-      const Matrix<3> own = at->J_point.transpose() * at->J_point;
-      const Eigen::LLT<Matrix<3>> elimination(own);
-      if (elimination.info() != Eigen::Success) continue;
+      Matrix<3> own = Matrix<3>::Zero();
+      add_transposed_product(own, at->J_point, at->J_point);
+      const Cholesky<3> elimination(own);
+      if (!elimination.good()) continue;
       track.elimination = elimination;
-      track.coupling = at->J_point.transpose() * at->J_shared;
-      track.gradient = at->J_point.transpose() * at->residual;
+      add_transposed_product(track.coupling, at->J_point, at->J_shared);
+      add_transposed_product(track.gradient, at->J_point, at->residual);
       const Vector<3> eliminated = elimination.solve(track.gradient);
       track.chi_squared = at->residual.squaredNorm() - track.gradient.dot(eliminated);
       if (!(track.chi_squared < gate)) continue;
       const double weight = robust_weight(RobustLoss::cauchy, loss_scale, track.chi_squared);
-      H += weight * (at->J_shared.transpose() * at->J_shared -
-                     track.coupling.transpose() * elimination.solve(track.coupling));
-      g += weight * (at->J_shared.transpose() * at->residual - track.coupling.transpose() * eliminated);
+      add_transposed_product(H, at->J_shared, at->J_shared, weight);
+      add_transposed_product(H, track.coupling, elimination.solve(track.coupling), -weight);
+      add_transposed_product(g, at->J_shared, at->residual, weight);
+      add_transposed_product(g, track.coupling, eliminated, -weight);
     }
   }
 
@@ -253,10 +255,10 @@ private:
                                                              const SE3& guess,
                                                              const MotionCalibrationOptions& options = {}) {
   MotionCalibration result{state, covariance, guess};
-  const Eigen::LLT<Matrix<5>> prior(covariance);
-  CAIRN_EXPECTS(state.allFinite() && covariance.allFinite() && prior.info() == Eigen::Success,
+  const Cholesky<5> prior(covariance);
+  CAIRN_EXPECTS(state.allFinite() && covariance.allFinite() && prior.good(),
                 "calibrate_from_motion: expected a finite state and a positive definite covariance");
-  const Matrix<5> information = symmetrised(Matrix<5>(prior.solve(Matrix<5>::Identity())));
+  const Matrix<5> information = prior.inverse();
   detail::MotionCalibrationProblem problem(rig, state, guess, pairs);
   if (problem.size() < options.min_inliers) return result;
   const double gate = chi_square_quantile(options.gate_probability, 5);

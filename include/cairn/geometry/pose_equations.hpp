@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <optional>
 
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/geometry/stereo_residual.hpp>
 #include <cairn/version.hpp>
@@ -125,16 +126,10 @@ private:
 };
 
 /// Cholesky factor of an information matrix; nothing where a direction is undetermined given the others.
-[[nodiscard]] inline std::optional<Eigen::LLT<Matrix<6>>> factor_information(const Matrix<6>& information) {
-  const Vector<6> diagonal = information.diagonal();
-  if (!(diagonal.minCoeff() > 0)) return std::nullopt;
-  const Eigen::LLT<Matrix<6>> result(information);
-  if (result.info() != Eigen::Success) return std::nullopt;
+[[nodiscard]] inline std::optional<Cholesky<6>> factor_information(const Matrix<6>& information) {
   constexpr double least_share = 1e-10;  // of a direction's information that the others do not explain
-  for (int i = 0; i < 6; ++i) {
-    const double pivot = result.matrixLLT()(i, i);
-    if (!(pivot * pivot > least_share * diagonal(i))) return std::nullopt;
-  }
+  const Cholesky<6> result(information);
+  if (!(result.good() && result.least_share() > least_share)) return std::nullopt;
   return result;
 }
 

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/geometry/alignment.hpp>
@@ -144,10 +145,9 @@ private:
         : q(frame.T_source_target * pair.target), r(q - pair.source) {
       const Matrix<3> half = frame.R_source_target * pair.target_covariance;
       const Matrix<3> C = pair.source_covariance + half * frame.R_source_target.transpose();
-      const Eigen::LLT<Matrix<3>> factor(C);
-      weight = factor.info() == Eigen::Success ? Matrix<3>(factor.solve(Matrix<3>::Identity()))
-                                               : Matrix<3>::Zero();
-      usable = factor.info() == Eigen::Success;
+      const Cholesky<3> factor(C);
+      usable = factor.good();
+      weight = usable ? factor.inverse() : Matrix<3>::Zero();
     }
     [[nodiscard]] double chi_squared() const noexcept {
       return usable ? r.dot(weight * r) : std::numeric_limits<double>::infinity();
@@ -210,7 +210,7 @@ private:
   if (!result.good()) return result;
   result.T_target_source = motion;
   result.information = information;
-  result.covariance = symmetrised(factor->solve(Matrix<6>::Identity()));
+  result.covariance = factor->inverse();
   result.inlier_count = score.inliers;
   problem.inliers(motion, result.inliers);
   return result;

@@ -77,7 +77,7 @@ inline void finish_stereo_pose(const StereoPoseProblem& problem, SE3 pose, const
   result.status = StereoPoseStatus::good;
   result.T_world_camera = pose;
   result.information = information;
-  result.covariance = symmetrised(factor->solve(Matrix<6>::Identity()));
+  result.covariance = factor->inverse();
   result.inlier_count = score.inliers;
   problem.inliers(pose, result.inliers);
 }

@@ -21,6 +21,7 @@
 #include <optional>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/geometry/camera.hpp>
 #include <cairn/geometry/stereo_rig.hpp>
@@ -189,10 +190,10 @@ private:
     e.head<2>() = (l.J_pixel / sigma_left) * (l.normalised - p.head<2>() / p(2));
     e.tail<2>() = (r.J_pixel / sigma_right) * (r.normalised - q.head<2>() / q(2));
     const Matrix<3> information = A.transpose() * A;
-    const Eigen::LLT<Matrix<3>> factor(information);
-    if (factor.info() != Eigen::Success) return false;
+    const Cholesky<3> factor(information);
+    if (!factor.good()) return false;
     result.point += factor.solve(A.transpose() * e);
-    result.covariance = symmetrised(factor.solve(Matrix<3>::Identity()));
+    result.covariance = factor.inverse();
     return true;
   }
 
