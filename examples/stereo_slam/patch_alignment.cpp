@@ -5,6 +5,8 @@
 #include <array>
 #include <cmath>
 
+#include <Eigen/Cholesky>
+
 #include <cairn/core/linalg.hpp>
 
 namespace stereo_slam {
