@@ -7,10 +7,10 @@
 /// Their looks live in a landmark store (cairn/index/landmark_map.hpp); both go by the same id.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include <cairn/core/check.hpp>
@@ -20,12 +20,11 @@
 namespace stereo_slam {
 
 using LandmarkId = std::uint32_t;
-inline constexpr int descriptor_size = 64;
 
 struct Landmark {
   LandmarkId id = 0;
   cairn::Gaussian<cairn::Vector<3>> position;  ///< world frame [m]
-  std::array<float, descriptor_size> descriptor{};
+  std::vector<float> descriptor;
   std::int8_t sign = 0;  ///< of the Laplacian: -1 bright, +1 dark
   std::uint8_t grey = 0;
   int first_seen = 0;  ///< step
@@ -37,9 +36,9 @@ struct Landmark {
 /// Landmarks in no particular but deterministic order, found by id in O(1).
 class Landmarks {
 public:
-  void add(const Landmark& landmark) {
+  void add(Landmark landmark) {
     place_[landmark.id] = landmarks_.size();
-    landmarks_.push_back(landmark);
+    landmarks_.push_back(std::move(landmark));
   }
 
   void remove(LandmarkId id) {
@@ -48,7 +47,7 @@ public:
     const std::size_t place = found->second;
     place_.erase(found);
     if (place + 1 != landmarks_.size()) {
-      landmarks_[place] = landmarks_.back();
+      landmarks_[place] = std::move(landmarks_.back());
       place_[landmarks_[place].id] = place;
     }
     landmarks_.pop_back();

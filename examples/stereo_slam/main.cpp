@@ -32,6 +32,7 @@ struct Arguments {
   std::filesystem::path out = "stereo_slam_out";
   std::filesystem::path dump;
   std::string store = "multi";
+  std::string features = "surf";
 };
 
 /// Everything the command line can say; CLI11 ends the program by an exception on --help and on mistakes.
@@ -64,6 +65,10 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
                "oriented SURF, for cameras that roll (default: upright)");
   app.add_flag("--calibrate", arguments.pipeline.calibrate,
                "correct the rig's calibration while moving, for rigs that come loose (default: trust it)");
+  app.add_option("--features", arguments.features,
+                 "interest points: surf, or OpenCV's sift or orb where it was there when building")
+      ->check(CLI::IsMember({"surf", "sift", "orb"}))
+      ->capture_default_str();
   app.add_option("--script", arguments.dataset.arena.script,
                  "arena: turn (on the spot), loop (two laps) or spiral")
       ->check(CLI::IsMember({"turn", "loop", "spiral"}))
@@ -144,6 +149,10 @@ int main(int argc, char** argv) {
     arguments.dataset.arena.seed = arguments.pipeline.seed;
     arguments.pipeline.store.kind =
         arguments.store == "multi" ? stereo_slam::StoreKind::multi : stereo_slam::StoreKind::single;
+    using Kind = stereo_slam::FeatureKind;
+    arguments.pipeline.features = arguments.features == "sift"  ? Kind::sift
+                                  : arguments.features == "orb" ? Kind::orb
+                                                                : Kind::surf;
     const auto frames = stereo_slam::open_dataset(arguments.dataset);
     if (!arguments.dump.empty()) {
       stereo_slam::write_kitti_sequence(*frames, arguments.dump);

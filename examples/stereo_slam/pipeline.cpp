@@ -57,12 +57,18 @@ struct SeenAt {
   [[nodiscard]] const cairn::Matrix<3>& noise(const State&) const { return R; }
 };
 
-cairn::SurfOptions surf_options(const PipelineOptions& options) {
-  cairn::SurfOptions surf;
-  surf.upright = !options.oriented;
-  surf.target_count = options.points;
-  surf.threshold = options.surf_threshold;
-  return surf;
+FeatureOptions feature_options(const PipelineOptions& options) {
+  return {.kind = options.features,
+          .points = options.points,
+          .surf_threshold = options.surf_threshold,
+          .oriented = options.oriented,
+          .threads = std::max(1U, options.threads / 2)};
+}
+
+StoreOptions store_options(const PipelineOptions& options) {
+  StoreOptions store = options.store;
+  store.dimension = dimension_of(options.features);
+  return store;
 }
 
 cairn::TriangulationOptions triangulation_options(const PipelineOptions& options,
@@ -83,12 +89,12 @@ float squared_distance(std::span<const float> a, std::span<const float> b) {
 Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options)
     : options_(options),
       rig_(rig),
-      surf_left_(surf_options(options), std::max(1U, options.threads / 2)),
-      surf_right_(surf_options(options), std::max(1U, options.threads / 2)),
+      extract_left_(make_extractor(feature_options(options))),
+      extract_right_(make_extractor(feature_options(options))),
       match_stereo_(rig, options.stereo),
       triangulate_(rig, triangulation_options(options, rig)),
       calibration_(rig, options.calibration),
-      store_(make_landmark_store(options.store)),
+      store_(make_landmark_store(store_options(options))),
       pose_covariance_(cairn::Matrix<6>::Zero()) {
   record_.seed = options.seed;
   record_.threads = options.threads;
@@ -145,7 +151,7 @@ void Pipeline::detect(const StereoFrame& frame) {
   const StageTimer timer(record_.frames.back(), Stage::detect);
   cairn::parallel_for(2, options_.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t side = begin; side < end; ++side)
-      (side == 0 ? left_ : right_) = side == 0 ? &surf_left_(frame.left) : &surf_right_(frame.right);
+      (side == 0 ? left_ : right_) = side == 0 ? &extract_left_(frame.left) : &extract_right_(frame.right);
   });
 }
 
@@ -312,14 +318,15 @@ void Pipeline::extend_map(const std::vector<Match>& agreed, const StereoFrame& f
     Landmark landmark;
     landmark.id = store_->add({left_->descriptor(local.point), point.laplacian});
     landmark.position = in_world(local);
-    std::ranges::copy(left_->descriptor(local.point), landmark.descriptor.begin());
+    const std::span<const float> look = left_->descriptor(local.point);
+    landmark.descriptor.assign(look.begin(), look.end());
     landmark.sign = point.laplacian;
     landmark.grey =
         frame.left(static_cast<int>(std::lround(point.x)), static_cast<int>(std::lround(point.y)));
     landmark.first_seen = landmark.last_seen = step_;
     landmark.left_pixel = local.left_pixel;
     landmark.right_pixel = local.right_pixel;
-    landmarks_.add(landmark);
+    landmarks_.add(std::move(landmark));
   }
 }
 

@@ -26,9 +26,9 @@
 #include <cairn/geometry/triangulation.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/vision/features.hpp>
-#include <cairn/vision/surf.hpp>
 
 #include "dataset.hpp"
+#include "feature_choice.hpp"
 #include "landmark_store.hpp"
 #include "landmarks.hpp"
 #include "run_record.hpp"
@@ -43,6 +43,7 @@ struct PipelineOptions {
   int points = 2000;             ///< interest points kept in an image
   float surf_threshold = 10.0F;  ///< least response [(grey levels)^2]
   bool oriented = false;         ///< SURF with orientation, for cameras that roll
+  FeatureKind features = FeatureKind::surf;
   StoreOptions store;
   StereoMatcherOptions stereo;
 
@@ -118,7 +119,7 @@ private:
 
   PipelineOptions options_;
   cairn::StereoRig rig_;
-  cairn::Surf surf_left_, surf_right_;
+  Extractor extract_left_, extract_right_;
   const cairn::Features* left_ = nullptr;  // of the current frame; they live in the extractors
   const cairn::Features* right_ = nullptr;
   StereoMatcher match_stereo_;
