@@ -62,12 +62,18 @@ FieldGrid compose(const FieldGrid& like, const cairn::PatchShape& shape, const s
   return sum;
 }
 
-double map_error(const FieldGrid& map, const FieldGrid& field) {
+/// Void where either is.
+FieldGrid difference(FieldGrid map, const FieldGrid& field) {
+  for (std::size_t i = 0; i < map.values().size(); ++i) map.values()[i] -= field.values()[i];
+  return map;
+}
+
+/// Over what is not void.
+double rms(const FieldGrid& grid) {
   double squares = 0, count = 0;
-  for (std::size_t i = 0; i < map.values().size(); ++i) {
-    const double difference = map.values()[i] - field.values()[i];
-    if (std::isnan(difference)) continue;
-    squares += difference * difference;
+  for (const double value : grid.values()) {
+    if (std::isnan(value)) continue;
+    squares += value * value;
     count += 1.0;
   }
   return count > 0.0 ? std::sqrt(squares / count) : 0.0;
@@ -91,35 +97,52 @@ FieldGrid with_small_holes_filled(const FieldGrid& map) {
   return filled;
 }
 
-/// Flies the circle by dead reckoning whose velocity drifts, and records what is seen.
+/// Dead reckoning whose velocity drifts: what it errs by, and what is known of that.
+class DeadReckoning {
+public:
+  DeadReckoning(const LoopFlight& flight, cairn::Random& random) : random_(random) {
+    const double variance = flight.drift_sigma * flight.drift_sigma;
+    state_.covariance = Vector<4>(1e-6, 1e-6, variance, variance).asDiagonal();
+    drift_ = {flight.drift_sigma * random_.normal(), flight.drift_sigma * random_.normal()};  // {}: in order
+    F_(0, 2) = F_(1, 3) = interval_ = flight.interval;
+    Q_(2, 2) = Q_(3, 3) = flight.drift_density * flight.interval;
+  }
+
+  /// To the next frame.
+  void advance() {
+    error_ += interval_ * drift_;
+    for (int i = 0; i < 2; ++i) drift_(i) += std::sqrt(Q_(2 + i, 2 + i)) * random_.normal();
+    state_.covariance = (F_ * state_.covariance * F_.transpose() + Q_).eval();
+    state_.since_start = (F_ * state_.since_start).eval();
+  }
+
+  [[nodiscard]] const Vector<2>& error() const { return error_; }
+  [[nodiscard]] const Reckoning& state() const { return state_; }
+
+private:
+  cairn::Random& random_;
+  Vector<2> drift_, error_ = Vector<2>::Zero();
+  Reckoning state_;
+  Matrix<4> F_ = Matrix<4>::Identity(), Q_ = Matrix<4>::Zero();
+  double interval_ = 0;
+};
+
+/// Flies the circle and records what is seen and where dead reckoning puts it.
 std::vector<Seen> fly(const FieldGrid& field, const LoopFlight& flight, double spacing, double noise) {
   const cairn::BsplineMap world(cairn::without_voids(field));
   const Vector<2> centre(0.5 * (field.frame().x0 + field.x_end()), 0.5 * (field.frame().y0 + field.y_end()));
   const double length = 2.0 * std::numbers::pi * flight.radius;
   const auto frames = static_cast<std::size_t>(length / (flight.velocity * flight.interval)) + 3;
   cairn::Random random(flight.seed, 3);
-  Vector<2> drift{flight.drift_sigma * random.normal(),
-                  flight.drift_sigma * random.normal()};  // {}: in order
-  Vector<2> error = Vector<2>::Zero();
-  Reckoning state{
-      Vector<4>(1e-6, 1e-6, flight.drift_sigma * flight.drift_sigma, flight.drift_sigma * flight.drift_sigma)
-          .asDiagonal()};
-  Matrix<4> F = Matrix<4>::Identity(), Q = Matrix<4>::Zero();
-  F(0, 2) = F(1, 3) = flight.interval;
-  Q(2, 2) = Q(3, 3) = flight.drift_density * flight.interval;
+  DeadReckoning reckoning(flight, random);
   std::vector<Seen> seen;
   cairn::PatchSamples samples;
   for (std::size_t k = 0; k < frames; ++k) {
-    const double angle = static_cast<double>(k) * flight.velocity * flight.interval / flight.radius;
-    const Vector<2> truth = centre + flight.radius * Vector<2>(std::cos(angle), std::sin(angle));
-    if (k > 0) {
-      error += flight.interval * drift;
-      for (int i = 0; i < 2; ++i)
-        drift(i) += std::sqrt(flight.drift_density * flight.interval) * random.normal();
-      state.covariance = (F * state.covariance * F.transpose() + Q).eval();
-      state.since_start = (F * state.since_start).eval();
-    }
+    if (k > 0) reckoning.advance();
+    const double time = static_cast<double>(k) * flight.interval;
+    const double angle = time * flight.velocity / flight.radius;
     const double heading = angle + 0.5 * std::numbers::pi;
+    const Vector<2> truth = centre + flight.radius * Vector<2>(std::cos(angle), std::sin(angle));
     cairn::sample_patch(world, flight.shape,
                         PatchPlacement::of(truth(0), truth(1), spacing, spacing, heading), samples);
     if (samples.count_inside < flight.shape.size())
@@ -128,18 +151,28 @@ std::vector<Seen> fly(const FieldGrid& field, const LoopFlight& flight, double s
                                   2.0 * spacing * std::hypot(flight.shape.along(), flight.shape.half_width)) +
                    " m each way");
     for (double& value : samples.value) value += noise * random.normal();
-    Seen frame{{static_cast<double>(k) * flight.interval, truth(0), truth(1), truth(0) + error(0),
-                truth(1) + error(1), 0, 0, 0, 0},
-               heading,
-               samples.value,
-               state};
-    frame.frame.after_x = frame.frame.before_x;
-    frame.frame.after_y = frame.frame.before_y;
-    frame.frame.sigma_before = std::sqrt(state.covariance(0, 0) + state.covariance(1, 1));
-    frame.frame.sigma_after = frame.frame.sigma_before;
-    seen.push_back(std::move(frame));
+    const Vector<2> believed = truth + reckoning.error();
+    const Matrix<4>& P = reckoning.state().covariance;
+    const double sigma = std::sqrt(P(0, 0) + P(1, 1));
+    seen.push_back(
+        {{time, truth(0), truth(1), believed(0), believed(1), believed(0), believed(1), sigma, sigma},
+         heading,
+         samples.value,
+         reckoning.state()});
   }
   return seen;
+}
+
+/// Looks for the last frame in a map of the first ones.
+cairn::Fix recognise_start(const FieldGrid& like, const LoopFlight& flight, const std::vector<Seen>& seen,
+                           double spacing) {
+  const FieldGrid start_map =
+      with_small_holes_filled(compose(like, flight.shape, seen, flight.start_frames, false, spacing));
+  const Seen& last = seen.back();
+  return cairn::correlation_search(
+      cairn::BilinearMap(start_map), flight.shape, last.z,
+      PatchPlacement::of(last.frame.before_x, last.frame.before_y, spacing, spacing, last.heading),
+      {.radius = std::max(10.0 * spacing, 3.0 * last.frame.sigma_before), .smallest_share = 0.5});
 }
 
 /// Conditions all frames on the fix of the last one: the covariance of frames k and n is P_k Phi(n, k)^T, so
@@ -163,6 +196,32 @@ void correct(std::vector<Seen>& flight, const Vector<2>& fix, const Matrix<2>& f
   }
 }
 
+/// Fills in what the maps before and after differ from the field by.
+void compare_maps(const FieldGrid& field, const FieldGrid& before, const FieldGrid& after,
+                  LoopResult& result) {
+  cairn::RunningMoments mapped;
+  for (std::size_t i = 0; i < before.values().size(); ++i)
+    if (!std::isnan(before.values()[i])) mapped.add(field.values()[i]);
+  result.field_deviation = mapped.standard_deviation();
+  result.map_error_before = difference(before, field);
+  result.map_error_after = difference(after, field);
+  result.map_rms_before = rms(*result.map_error_before);
+  result.map_rms_after = rms(*result.map_error_after);
+}
+
+/// Fills in the frames, and how far from the truth they were put.
+void compare_placements(const std::vector<Seen>& seen, LoopResult& result) {
+  double squares_before = 0, squares_after = 0;
+  for (const Seen& s : seen) {
+    const LoopFrame& f = s.frame;
+    squares_before += std::pow(f.before_x - f.truth_x, 2) + std::pow(f.before_y - f.truth_y, 2);
+    squares_after += std::pow(f.after_x - f.truth_x, 2) + std::pow(f.after_y - f.truth_y, 2);
+    result.frames.push_back(f);
+  }
+  result.placement_rms_before = std::sqrt(squares_before / static_cast<double>(seen.size()));
+  result.placement_rms_after = std::sqrt(squares_after / static_cast<double>(seen.size()));
+}
+
 }  // namespace
 
 LoopResult fly_loop(const FieldGrid& field, const LoopFlight& flight) {
@@ -173,39 +232,18 @@ LoopResult fly_loop(const FieldGrid& field, const LoopFlight& flight) {
   std::vector<Seen> seen = fly(field, flight, spacing, flight.sensor_noise * moments.standard_deviation());
 
   LoopResult result;
-  const FieldGrid start_map =
-      with_small_holes_filled(compose(field, flight.shape, seen, flight.start_frames, false, spacing));
-  const Seen& last = seen.back();
-  const cairn::Fix fix = cairn::correlation_search(
-      cairn::BilinearMap(start_map), flight.shape, last.z,
-      PatchPlacement::of(last.frame.before_x, last.frame.before_y, spacing, spacing, last.heading),
-      {.radius = std::max(10.0 * spacing, 3.0 * last.frame.sigma_before), .smallest_share = 0.5});
+  const cairn::Fix fix = recognise_start(field, flight, seen, spacing);
   result.closed = fix.accepted();
   const FieldGrid before = compose(field, flight.shape, seen, seen.size(), false, spacing);
   if (result.closed) {
-    result.closing_error =
-        std::hypot(fix.placement.x - last.frame.truth_x, fix.placement.y - last.frame.truth_y);
+    const LoopFrame& last = seen.back().frame;
+    result.closing_error = std::hypot(fix.placement.x - last.truth_x, fix.placement.y - last.truth_y);
     // Besides its own covariance a fix against composed samples errs by where in its cell a sample fell.
     const double cell = spacing * spacing / 12.0;
     correct(seen, Vector<2>(fix.placement.x, fix.placement.y), fix.covariance + cell * Matrix<2>::Identity());
   }
-  const FieldGrid after = compose(field, flight.shape, seen, seen.size(), true, spacing);
-  cairn::RunningMoments mapped;
-  for (std::size_t i = 0; i < before.values().size(); ++i)
-    if (!std::isnan(before.values()[i])) mapped.add(field.values()[i]);
-  result.field_deviation = mapped.standard_deviation();
-  result.map_rms_before = map_error(before, field);
-  result.map_rms_after = map_error(after, field);
-  double squares_before = 0, squares_after = 0;
-  for (const Seen& s : seen) {
-    squares_before +=
-        std::pow(s.frame.before_x - s.frame.truth_x, 2) + std::pow(s.frame.before_y - s.frame.truth_y, 2);
-    squares_after +=
-        std::pow(s.frame.after_x - s.frame.truth_x, 2) + std::pow(s.frame.after_y - s.frame.truth_y, 2);
-    result.frames.push_back(s.frame);
-  }
-  result.placement_rms_before = std::sqrt(squares_before / static_cast<double>(seen.size()));
-  result.placement_rms_after = std::sqrt(squares_after / static_cast<double>(seen.size()));
+  compare_maps(field, before, compose(field, flight.shape, seen, seen.size(), true, spacing), result);
+  compare_placements(seen, result);
   return result;
 }
 

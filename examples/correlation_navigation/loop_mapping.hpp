@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include <cairn/field/grid.hpp>
@@ -39,7 +40,9 @@ struct LoopResult {
   double placement_rms_before = 0, placement_rms_after = 0;  ///< distance of frames from the truth [m]
   double map_rms_before = 0, map_rms_after = 0;  ///< map against field over the nodes mapped, in its unit
   double field_deviation = 0;                    ///< of the field over them: what an empty map would err
-  double closing_error = 0;                      ///< of the fix that closed the loop [m]
+  /// Map less field, on the field's grid; void where nothing was mapped.
+  std::optional<cairn::FieldGrid> map_error_before, map_error_after;
+  double closing_error = 0;  ///< of the fix that closed the loop [m]
 };
 
 /// Throws cairn::Error when the field is too small for the loop.

@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: MIT
 #include "outputs.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <iostream>
 #include <numbers>
 #include <system_error>
@@ -14,6 +16,7 @@
 #include <cairn/io/file.hpp>
 #include <cairn/io/text.hpp>
 
+#include "support/image_io.hpp"
 #include "support/report.hpp"
 
 namespace correlation_navigation {
@@ -162,6 +165,35 @@ void add_planar(example::Report& page, const Results& r) {
       .logarithmic = true});
 }
 
+#ifdef EXAMPLES_HAVE_PNG
+/// The two errors side by side, north up: the darker, the larger; white where nothing was mapped.
+void add_map_error(example::Report& page, const LoopResult& loop) {
+  constexpr int gap = 8;
+  const cairn::FieldGrid& before = *loop.map_error_before;
+  cairn::Image image(2 * before.columns() + gap, before.rows(), 255);
+  int left = 0;
+  for (const cairn::FieldGrid* error : {&before, &*loop.map_error_after}) {
+    for (int r = 0; r < error->rows(); ++r)
+      for (int c = 0; c < error->columns(); ++c) {
+        const double size = std::abs((*error)(c, r)) / loop.field_deviation;
+        if (!std::isnan(size))
+          image(left + c, error->rows() - 1 - r) = static_cast<std::uint8_t>(225 * (1 - std::min(1.0, size)));
+      }
+    left += before.columns() + gap;
+  }
+  page.add(example::Picture{
+      .title = "Error of the map, before and after",
+      .caption =
+          "Map less field at every node that was seen, by dead reckoning (left) and corrected (right). "
+          "Light grey is no error, black one standard deviation of the field or more, white was not "
+          "mapped.",
+      .png = example::png_bytes(image),
+      .width = image.width(),
+      .height = image.height(),
+      .wide = true});
+}
+#endif
+
 void add_loop(example::Report& page, const Results& r) {
   example::PlaneCurve truth{"truth", Ink::truth, {}, {}, false},
       before{"dead reckoning", Ink::wrong, {}, {}, false}, after{"corrected", Ink::belief, {}, {}, false};
@@ -198,6 +230,9 @@ void add_loop(example::Report& page, const Results& r) {
       .curves = {{"dead reckoning", Ink::wrong, error_before},
                  {"corrected", Ink::belief, error_after},
                  {"predicted sigma after", Ink::grey, sigma_after, true}}});
+#ifdef EXAMPLES_HAVE_PNG
+  if (r.loop.field_deviation > 0) add_map_error(page, r.loop);
+#endif
 }
 
 std::string errors_csv(const StraightResult& result) {

@@ -13,8 +13,8 @@
 #include <cairn/io/trajectory.hpp>
 
 #include "arena_dataset.hpp"
-#include "image_io.hpp"
 #include "recording.hpp"
+#include "support/image_io.hpp"
 
 namespace stereo_slam {
 namespace {
@@ -66,8 +66,8 @@ void write_kitti_sequence(const Dataset& dataset, const std::filesystem::path& f
     const StereoFrame frame = dataset.frame(i);
     const std::string digits = std::to_string(i);
     const std::string file = std::string(6 - std::min<std::size_t>(6, digits.size()), '0') + digits + ".png";
-    write_png(folder / "image_0" / file, frame.left);
-    write_png(folder / "image_1" / file, frame.right);
+    example::write_png(folder / "image_0" / file, frame.left);
+    example::write_png(folder / "image_1" / file, frame.right);
     cairn::append_number(times, frame.time);
     times += '\n';
     if (frame.truth) truth.push_back({frame.time, *frame.truth});

@@ -6,6 +6,7 @@
 /// found when building.
 #pragma once
 
+#include <array>
 #include <functional>
 
 #include <cairn/vision/features.hpp>
@@ -13,6 +14,7 @@
 namespace stereo_slam {
 
 enum class FeatureKind { surf, sift, orb };
+inline constexpr std::array<const char*, 3> feature_names = {"surf", "sift", "orb"};
 
 /// Whether make_extractor() has more than SURF to offer.
 [[nodiscard]] bool built_with_opencv() noexcept;

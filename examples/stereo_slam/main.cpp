@@ -67,7 +67,8 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
                "correct the rig's calibration while moving, for rigs that come loose (default: trust it)");
   app.add_option("--features", arguments.features,
                  "interest points: surf, or OpenCV's sift or orb where it was there when building")
-      ->check(CLI::IsMember({"surf", "sift", "orb"}))
+      ->check(CLI::IsMember(
+          std::vector<std::string>(stereo_slam::feature_names.begin(), stereo_slam::feature_names.end())))
       ->capture_default_str();
   app.add_option("--script", arguments.dataset.arena.script,
                  "arena: turn (on the spot), loop (two laps) or spiral")
@@ -149,10 +150,9 @@ int main(int argc, char** argv) {
     arguments.dataset.arena.seed = arguments.pipeline.seed;
     arguments.pipeline.store.kind =
         arguments.store == "multi" ? stereo_slam::StoreKind::multi : stereo_slam::StoreKind::single;
-    using Kind = stereo_slam::FeatureKind;
-    arguments.pipeline.features = arguments.features == "sift"  ? Kind::sift
-                                  : arguments.features == "orb" ? Kind::orb
-                                                                : Kind::surf;
+    const auto name = std::ranges::find(stereo_slam::feature_names, arguments.features);
+    arguments.pipeline.features =
+        static_cast<stereo_slam::FeatureKind>(name - stereo_slam::feature_names.begin());
     const auto frames = stereo_slam::open_dataset(arguments.dataset);
     if (!arguments.dump.empty()) {
       stereo_slam::write_kitti_sequence(*frames, arguments.dump);

@@ -99,6 +99,7 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options)
   record_.seed = options.seed;
   record_.threads = options.threads;
   record_.target_points = options.points;
+  record_.features = feature_names[static_cast<std::size_t>(options.features)];
   record_.store = options.store.kind == StoreKind::multi ? "multi" : "single";
 }
 

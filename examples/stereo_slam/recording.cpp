@@ -10,7 +10,7 @@
 #include <cairn/core/check.hpp>
 #include <cairn/io/text.hpp>
 
-#include "image_io.hpp"
+#include "support/image_io.hpp"
 
 namespace stereo_slam {
 namespace {
@@ -30,8 +30,10 @@ class Played final : public Dataset {
 public:
   explicit Played(Recording recording) : recording_(std::move(recording)) {
     cairn::StereoRig& rig = recording_.rig;
-    if (rig.left.width() == 0) rig.left = with_size(rig.left, read_image(recording_.frames.front().left));
-    if (rig.right.width() == 0) rig.right = with_size(rig.right, read_image(recording_.frames.front().right));
+    if (rig.left.width() == 0)
+      rig.left = with_size(rig.left, example::read_image(recording_.frames.front().left));
+    if (rig.right.width() == 0)
+      rig.right = with_size(rig.right, example::read_image(recording_.frames.front().right));
   }
 
   [[nodiscard]] std::string name() const override { return recording_.name; }
@@ -54,7 +56,7 @@ public:
 
 private:
   static cairn::Image read_sized(const std::filesystem::path& file, const cairn::PinholeCamera& camera) {
-    cairn::Image image = read_image(file);
+    cairn::Image image = example::read_image(file);
     if (image.width() != camera.width() || image.height() != camera.height())
       cairn::raise(file.string() + ": the image has " + size_text(image.width(), image.height()) +
                    "; expected " + size_text(camera.width(), camera.height()) + " as the calibrated camera");

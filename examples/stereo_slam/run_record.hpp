@@ -69,7 +69,7 @@ struct SampleFrame {
 
 struct RunRecord {
   std::string dataset;
-  std::string store;
+  std::string features, store;
   std::uint64_t seed = 0;
   unsigned threads = 1;
   int target_points = 0;

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "image_io.hpp"
+#include "support/image_io.hpp"
 
 namespace stereo_slam {
 namespace {
@@ -232,7 +232,7 @@ example::Picture sample_picture(const RunRecord& run) {
   const SampleFrame& sample = *run.sample;
   picture.caption = "Left image of frame " + std::to_string(sample.index) +
                     ". A line leads from each point to where the right image shows it.";
-  picture.png = png_bytes(sample.left);
+  picture.png = example::png_bytes(sample.left);
   picture.width = sample.left.width();
   picture.height = sample.left.height();
   picture.wide = picture.width > 2 * picture.height;
@@ -249,8 +249,8 @@ example::Picture sample_picture(const RunRecord& run) {
 
 std::string subtitle_of(const RunRecord& run, const Summary& summary) {
   return std::to_string(summary.frames) + " frames in " + example::readable(summary.seconds) + " s, store " +
-         run.store + ", " + std::to_string(run.target_points) + " points an image, seed " +
-         std::to_string(run.seed) + ", " + std::to_string(run.threads) +
+         run.store + ", " + std::to_string(run.target_points) + " " + run.features +
+         " points an image, seed " + std::to_string(run.seed) + ", " + std::to_string(run.threads) +
          (run.threads == 1 ? " thread" : " threads");
 }
 

@@ -186,6 +186,7 @@ std::string summary_json(const RunRecord& run, const Summary& summary) {
   json["inliers"] = number(summary.inliers);
   json["landmarks"] = summary.landmarks;
   append_errors(json, summary);
+  json["features"] = run.features;
   json["store"] = run.store;
   json["seed"] = run.seed;
   json["threads"] = run.threads;

@@ -145,6 +145,16 @@ TEST_SUITE("correlation_navigation") {
     CHECK(result.closing_error < 45.0);
     CHECK(result.placement_rms_after < 0.5 * result.placement_rms_before);
     CHECK(result.map_rms_after < result.map_rms_before);
+    REQUIRE((result.map_error_before && result.map_error_after));
+    double squares = 0, mapped = 0;
+    for (const double error : result.map_error_after->values())
+      if (!std::isnan(error)) {
+        squares += error * error;
+        mapped += 1;
+      }
+    CHECK(mapped > 1000);
+    CHECK(mapped < 0.9 * static_cast<double>(result.map_error_after->values().size()));
+    CHECK(std::sqrt(squares / mapped) == doctest::Approx(result.map_rms_after));
     CHECK(cairn_test::message_of([] {
             static_cast<void>(fly_loop(ground(6, 100, 100), {}));
           }).find("loop: expected a field of at least") != std::string::npos);

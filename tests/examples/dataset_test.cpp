@@ -18,10 +18,10 @@
 #include <cairn/io/trajectory.hpp>
 
 #include "arena_dataset.hpp"
-#include "image_io.hpp"
 #include "recording.hpp"
 #include "support/data.hpp"
 #include "support/folder.hpp"
+#include "support/image_io.hpp"
 
 namespace {
 
@@ -79,8 +79,8 @@ public:
     fs::create_directories(path() / "image_0");
     fs::create_directories(path() / "image_1");
     for (std::size_t i = 0; i < 3; ++i) {
-      stereo_slam::write_png(left(i), picture(i, 0));
-      stereo_slam::write_png(right(i), picture(i, 1));
+      example::write_png(left(i), picture(i, 0));
+      example::write_png(right(i), picture(i, 1));
     }
     put("calib.txt", "P0: 100 0 6 0 0 110 4 0 0 0 1 0\nP1: 100 0 6 -50 0 110 4 0 0 0 1 0\n");
     put("times.txt", "0\n0.1\n0.25\n");
@@ -102,8 +102,8 @@ public:
       put(std::string(camera) + "/timestamps.txt", times);
     }
     for (std::size_t i = 0; i < 6; ++i) {
-      if (i != 3) stereo_slam::write_png(image(0, i), picture(i, 0));
-      if (i != 4) stereo_slam::write_png(image(1, i), picture(i, 1));
+      if (i != 3) example::write_png(image(0, i), picture(i, 0));
+      if (i != 4) example::write_png(image(1, i), picture(i, 1));
     }
     put("calib_cam_to_cam.txt", calibration());
     put("poses_cam0_rectified.txt",
@@ -135,8 +135,7 @@ public:
       for (std::size_t i = 0; i < 4; ++i) {
         if (i == 2 && camera == "cam1") continue;
         const std::string name = time(i) + ".png";
-        stereo_slam::write_png(path() / "mav0" / camera / "data" / name,
-                               picture(i, camera == "cam0" ? 0 : 1));
+        example::write_png(path() / "mav0" / camera / "data" / name, picture(i, camera == "cam0" ? 0 : 1));
         list += time(i) + "," + name + "\r\n";
       }
       put("mav0/" + camera + "/data.csv", list);
@@ -262,7 +261,7 @@ TEST_SUITE("dataset") {
                {"image_0/000001.png: damaged PNG"}));
     CHECK(says(broken([](F f) { cairn::write_file_atomically(f.left(2), "no picture"); }),
                {"image_0/000002.png: neither PNG nor PGM"}));
-    CHECK(says(broken([](F f) { stereo_slam::write_png(f.right(2), cairn::Image(5, 6)); }),
+    CHECK(says(broken([](F f) { example::write_png(f.right(2), cairn::Image(5, 6)); }),
                {"image_1/000002.png: the image has 5 x 6 pixels; expected 12 x 8"}));
     CHECK(says(broken([](F f) { fs::remove(f / "calib.txt"); }), {"calib.txt: no such file"}));
     CHECK(says(broken([](F f) { replace_in(f / "calib.txt", "P1:", "P2:"); }),

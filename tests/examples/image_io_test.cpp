@@ -1,6 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
-#include "image_io.hpp"
+#include "support/image_io.hpp"
 
 #include <cstdint>
 #include <cstring>
@@ -42,7 +42,7 @@ void write_foreign_png(const std::filesystem::path& path, unsigned width, unsign
 // The message with which a file is refused; empty where it is read.
 std::string refusal(const std::filesystem::path& path) {
   try {
-    static_cast<void>(stereo_slam::read_image(path));
+    static_cast<void>(example::read_image(path));
   } catch (const cairn::Error& error) {
     return error.what();
   }
@@ -63,10 +63,10 @@ TEST_SUITE("image_io") {
     const cairn_test::Folder folder;
     for (const int width : {1, 2, 33, 640}) {
       const cairn::Image image = random_image(width, 480 / width + 1, random);
-      stereo_slam::write_png(folder / "image.png", image);
-      CHECK(stereo_slam::read_image(folder / "image.png") == image);
+      example::write_png(folder / "image.png", image);
+      CHECK(example::read_image(folder / "image.png") == image);
       cairn::write_pgm(folder / "image.pgm", image);
-      CHECK(stereo_slam::read_image(folder / "image.pgm") == image);
+      CHECK(example::read_image(folder / "image.pgm") == image);
     }
   }
 
@@ -74,7 +74,7 @@ TEST_SUITE("image_io") {
     const cairn_test::Folder folder;
     const std::vector<std::uint8_t> rgb{255, 0, 0, 0, 255, 0, 0, 0, 255, 90, 90, 90};
     write_foreign_png(folder / "rgb.png", 4, 1, PNG_FORMAT_RGB, rgb);
-    const cairn::Image image = stereo_slam::read_image(folder / "rgb.png");
+    const cairn::Image image = example::read_image(folder / "rgb.png");
     REQUIRE(image.width() == 4);
     CHECK(image(1, 0) > image(0, 0));  // green is bright, blue is dark
     CHECK(image(0, 0) > image(2, 0));
@@ -100,7 +100,7 @@ TEST_SUITE("image_io") {
     png_write_end(png, info);
     png_destroy_write_struct(&png, &info);
     std::fclose(file);
-    const cairn::Image image = stereo_slam::read_image(folder / "deep.png");
+    const cairn::Image image = example::read_image(folder / "deep.png");
     REQUIRE(image.width() == 256);
     for (int grey = 0; grey < 256; ++grey) CHECK(int(image(grey, 0)) == grey);
   }
@@ -120,7 +120,7 @@ TEST_SUITE("image_io") {
   TEST_CASE("image_io: a PNG cut off anywhere before its last pixel is refused by name") {
     cairn::Random random(3);
     const cairn_test::Folder folder;
-    stereo_slam::write_png(folder / "whole.png", random_image(31, 17, random));
+    example::write_png(folder / "whole.png", random_image(31, 17, random));
     const std::string bytes = cairn::read_file(folder / "whole.png");
     constexpr std::size_t end_chunk = 12;  // IEND, after all pixels
     for (std::size_t length = 1; length + end_chunk + 8 < bytes.size(); ++length) {
@@ -134,7 +134,7 @@ TEST_SUITE("image_io") {
     cairn::Random random(4);
     const cairn_test::Folder folder;
     const cairn::Image whole = random_image(23, 9, random);
-    stereo_slam::write_png(folder / "whole.png", whole);
+    example::write_png(folder / "whole.png", whole);
     const std::string bytes = cairn::read_file(folder / "whole.png");
     int refused = 0;
     for (std::size_t i = 0; i < bytes.size(); ++i) {
@@ -144,7 +144,7 @@ TEST_SUITE("image_io") {
       CAPTURE(i);
       const std::string message = refusal(folder / "damaged.png");
       refused += message.empty() ? 0 : 1;
-      if (message.empty()) CHECK(stereo_slam::read_image(folder / "damaged.png") == whole);
+      if (message.empty()) CHECK(example::read_image(folder / "damaged.png") == whole);
     }
     CHECK(refused > static_cast<int>(bytes.size()) * 9 / 10);
   }

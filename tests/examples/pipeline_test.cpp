@@ -95,6 +95,26 @@ TEST_SUITE("pipeline") {
     CHECK(record.landmarks.size() == record.frames.back().landmarks);
   }
 
+  TEST_CASE("pipeline: follows it by OpenCV's points as well") {
+    if (!stereo_slam::built_with_opencv()) {
+      MESSAGE("skipped: built without OpenCV");
+      return;
+    }
+    for (const stereo_slam::FeatureKind kind :
+         {stereo_slam::FeatureKind::sift, stereo_slam::FeatureKind::orb}) {
+      PipelineOptions with = options();
+      with.features = kind;
+      const RunRecord record = run(drive(), with);
+      CAPTURE(record.features);
+      for (const FrameRecord& frame : record.frames) {
+        CHECK(frame.tracked);
+        const auto error = cairn::local(*frame.truth, frame.T_world_camera);
+        CHECK(error.head<3>().norm() < 0.04);
+        CHECK(error.tail<3>().norm() < 0.012);
+      }
+    }
+  }
+
   TEST_CASE("pipeline: has the same bits for 1, 2 and 3 threads") {
     const RunRecord one = run(drive(), options(1));
     CHECK(same_bits(one, run(drive(), options(2))));

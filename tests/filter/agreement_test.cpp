@@ -120,7 +120,7 @@ TEST_SUITE("agreement") {
     const auto check = [&](const auto& filter, auto belief) {
       REQUIRE(filter.predict(belief, p.process, 1.0) == Status::accepted);
       const auto plain = as_gaussian<decltype(belief), 4, double>(belief);
-      CHECK(relative_error(plain.covariance, expected.covariance) < 1e-11);
+      CHECK(relative_error(plain.covariance, expected.covariance) < 1e-10);
       auto wrong = filter;
       wrong.fading = 0.9;
       CHECK(wrong.predict(belief, p.process, 1.0) == Status::bad_option);

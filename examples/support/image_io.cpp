@@ -15,7 +15,7 @@
 #include <cairn/io/file.hpp>
 #include <cairn/io/netpbm.hpp>
 
-namespace stereo_slam {
+namespace example {
 namespace {
 
 // libpng's control block, released on every way out.
@@ -88,4 +88,4 @@ void write_png(const std::filesystem::path& path, cairn::ImageView image) {
   }
 }
 
-}  // namespace stereo_slam
+}  // namespace example

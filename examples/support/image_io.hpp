@@ -10,7 +10,7 @@
 
 #include <cairn/vision/image.hpp>
 
-namespace stereo_slam {
+namespace example {
 
 /// The image as 8-bit grey; colour becomes luminance, 16 bits are rounded to 8, transparency is put on black.
 /// Throws cairn::Error naming the file and what was expected when it is missing, neither PNG nor PGM,
@@ -23,4 +23,4 @@ namespace stereo_slam {
 /// Writes an 8-bit grey PNG, completely or not at all. Throws cairn::Error naming the path.
 void write_png(const std::filesystem::path& path, cairn::ImageView image);
 
-}  // namespace stereo_slam
+}  // namespace example
