@@ -89,7 +89,7 @@ void absolute(Scoreboard& board, const std::string& name, const Run& run, int co
 int main() {
   Scoreboard board("filter");
   const Rival us = ours(), points = ours_unscented(), factored = ours_factored();
-  const std::vector<Rival> rivals{openkf(), mherb(), tinyekf(), opencv(), hand_written()};
+  const std::vector<Rival> rivals{openkf(), mherb(), tinyekf(), opencv(), bfl(), hand_written()};
   constexpr double exact = 1e-6;
   fight(board, "KF 6/3 constant velocity", &Rival::kalman_6_3, us, rivals,
         {{"OpenKF", 1.0, 186.0 / 110.0}, {"mherb", 2.0, {}}}, exact);

@@ -37,5 +37,6 @@ Rival openkf();
 Rival tinyekf();
 Rival mherb();
 Rival opencv();
+Rival bfl();
 
 }  // namespace cairn_bench
