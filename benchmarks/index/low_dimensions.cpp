@@ -28,7 +28,7 @@ constexpr std::size_t query_count = 2000;
 
 Rivals rivals_for(const std::vector<Point3>& points) {
   Rivals rivals;
-  for (auto& rival : {make_nanoflann, make_flann_single, make_cgal})
+  for (auto& rival : {make_nanoflann, make_flann_single, make_cgal, make_ann, make_pico_tree})
     if (auto made = rival(points)) rivals.push_back(std::move(made));
   return rivals;
 }

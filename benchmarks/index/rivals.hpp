@@ -26,6 +26,8 @@ struct StaticRival {
 std::unique_ptr<StaticRival> make_nanoflann(const std::vector<Point3>& points);
 std::unique_ptr<StaticRival> make_flann_single(const std::vector<Point3>& points);
 std::unique_ptr<StaticRival> make_cgal(const std::vector<Point3>& points);
+std::unique_ptr<StaticRival> make_ann(const std::vector<Point3>& points);
+std::unique_ptr<StaticRival> make_pico_tree(const std::vector<Point3>& points);
 
 /// A growing index of 3-D points: nearest one.
 struct GrowingRival {
@@ -47,5 +49,6 @@ struct DescriptorRival {
   std::function<std::vector<TwoNearest>(const std::vector<float>& queries, int checks)> search;
 };
 std::unique_ptr<DescriptorRival> make_flann_trees(std::size_t dim, int trees);
+std::unique_ptr<DescriptorRival> make_hnswlib(std::size_t dim);
 
 }  // namespace cairn_bench
