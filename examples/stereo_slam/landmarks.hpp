@@ -31,6 +31,12 @@ struct Landmark {
   int last_seen = 0;   ///< step whose pose and pixels the position was last computed from
   cairn::Vector<2> left_pixel = cairn::Vector<2>::Zero(), right_pixel = cairn::Vector<2>::Zero();  ///< then
   int sightings = 1;
+
+  void seen(int step, const cairn::Vector<2>& left, const cairn::Vector<2>& right) {
+    last_seen = step;
+    left_pixel = left;
+    right_pixel = right;
+  }
 };
 
 /// Landmarks in no particular but deterministic order, found by id in O(1).

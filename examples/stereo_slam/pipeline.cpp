@@ -115,15 +115,13 @@ const FrameRecord& Pipeline::step(const StereoFrame& frame, double load_millisec
     std::vector<Match> matches = match_with_map();
     const std::optional<Located> located = locate(matches);
     if (located) {
-      T_last_camera_ = T_world_camera_.inverse() * located->pose.T_world_camera;
-      T_world_camera_ = located->pose.T_world_camera;
-      pose_covariance_ = located->pose.covariance;
+      move_to(located->pose);
       refine_landmarks(located->agreed);
       extend_map(located->agreed, frame);
       close_step();
       if (options_.calibrate) calibrate(located->agreed);
     } else {
-      T_last_camera_ = cairn::SE3();
+      stay();
       record_.notes.push_back(frame.name + ": lost, " + std::to_string(matches.size()) +
                               " matches with the map do not agree on a pose; the last pose is kept");
     }
@@ -137,8 +135,6 @@ const FrameRecord& Pipeline::step(const StereoFrame& frame, double load_millisec
     if (!T_truth_world_) T_truth_world_ = *frame.truth * T_world_camera_.inverse();
     result.truth = T_truth_world_->inverse() * *frame.truth;
   }
-  result.T_world_camera = T_world_camera_;
-  result.covariance = pose_covariance_;
   result.points_left = static_cast<int>(left_->size());
   result.points_right = static_cast<int>(right_->size());
   result.stereo_matches = static_cast<int>(locals_.size());
@@ -288,6 +284,20 @@ cairn::StereoPose Pipeline::decide_by_earliest(const std::vector<Match>& agreed,
   return all;
 }
 
+void Pipeline::move_to(const cairn::StereoPose& pose) {
+  T_last_camera_ = T_world_camera_.inverse() * pose.T_world_camera;
+  T_world_camera_ = pose.T_world_camera;
+  pose_covariance_ = pose.covariance;
+  record_.frames.back().T_world_camera = T_world_camera_;
+  record_.frames.back().covariance = pose_covariance_;
+}
+
+void Pipeline::stay() {
+  T_last_camera_ = cairn::SE3();
+  record_.frames.back().T_world_camera = T_world_camera_;
+  record_.frames.back().covariance = pose_covariance_;
+}
+
 /// Kalman filter of every landmark that was seen. Its R holds the pose's error too. (notes 11.4)
 void Pipeline::refine_landmarks(const std::vector<Match>& agreed) {
   const StageTimer timer(record_.frames.back(), Stage::update);
@@ -300,9 +310,7 @@ void Pipeline::refine_landmarks(const std::vector<Match>& agreed) {
     if (filter.predict(landmark.position, StandingStill{sigma}, 1.0) != cairn::Status::accepted) continue;
     if (!filter.update(landmark.position, SeenAt{seen.covariance}, seen.mean).accepted()) continue;
     ++landmark.sightings;
-    landmark.last_seen = step_;
-    landmark.left_pixel = local.left_pixel;
-    landmark.right_pixel = local.right_pixel;
+    landmark.seen(step_, local.left_pixel, local.right_pixel);
     store_->sighted(match.landmark);
   }
 }
@@ -324,9 +332,8 @@ void Pipeline::extend_map(const std::vector<Match>& agreed, const StereoFrame& f
     landmark.sign = point.laplacian;
     landmark.grey =
         frame.left(static_cast<int>(std::lround(point.x)), static_cast<int>(std::lround(point.y)));
-    landmark.first_seen = landmark.last_seen = step_;
-    landmark.left_pixel = local.left_pixel;
-    landmark.right_pixel = local.right_pixel;
+    landmark.first_seen = step_;
+    landmark.seen(step_, local.left_pixel, local.right_pixel);
     landmarks_.add(std::move(landmark));
   }
 }
@@ -356,10 +363,7 @@ void Pipeline::take_rig(const cairn::StereoRig& rig) {
     const cairn::Triangulation before = triangulate_(landmark.left_pixel, landmark.right_pixel);
     const cairn::Triangulation after = triangulate(landmark.left_pixel, landmark.right_pixel);
     if (!before.good() || !after.good()) continue;
-    const cairn::SE3& pose =
-        landmark.last_seen == step_
-            ? T_world_camera_
-            : record_.frames[static_cast<std::size_t>(landmark.last_seen)].T_world_camera;
+    const cairn::SE3& pose = record_.frames[static_cast<std::size_t>(landmark.last_seen)].T_world_camera;
     landmark.position.mean += pose.rotation() * (after.point - before.point);
   }
   rig_ = rig;

@@ -100,6 +100,8 @@ private:
   [[nodiscard]] std::vector<Match> match_with_map() const;
   /// Adds to `matches` what the second look finds.
   [[nodiscard]] std::optional<Located> locate(std::vector<Match>& matches) const;
+  void move_to(const cairn::StereoPose& pose);
+  void stay();
   void refine_landmarks(const std::vector<Match>& agreed);
   void extend_map(const std::vector<Match>& agreed, const StereoFrame& frame);
   void close_step();
