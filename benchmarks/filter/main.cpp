@@ -33,6 +33,8 @@ bool agrees(double ours, double theirs, double tolerance) {
   return std::abs(ours - theirs) <= tolerance * std::abs(ours);
 }
 
+// Nanoseconds were asked for on a certain machine, with a rival's beside them: their ratio holds on any.
+
 /// One problem: ours against all who solve it, one row a rival. What is owed is a ratio.
 void fight(Scoreboard& board, const std::string& name, Run Rival::* problem, const Rival& us,
            const std::vector<Rival>& rivals, const std::vector<Owed>& owed, double tolerance) {
@@ -72,8 +74,8 @@ void fight(Scoreboard& board, const std::string& name, Run Rival::* problem, con
   }
 }
 
-void absolute(Scoreboard& board, const std::string& name, const Run& run, int count, double each, double must,
-              double aim) {
+void absolute(Scoreboard& board, const std::string& name, const Run& run, int count, double each,
+              std::optional<double> must, std::optional<double> aim) {
   const auto timings =
       interleave({{"ours", [&] { do_not_optimise(run(count)); }, double(count) * each}}, turns);
   board.add({.name = name,
@@ -107,14 +109,16 @@ int main() {
         {{"hand-written Eigen", 2.0, 3860.0 / 1300.0}}, 1e-3);
   fight(board, "EKF 15/6 inertial", &Rival::extended_15_6, us, rivals, {{"TinyEKF", 1.3, 2740.0 / 900.0}},
         exact);
-  fight(board, "UD 6/3 and square root", &Rival::factored_6_3, factored, rivals, {}, exact);
-  fight(board, "UD 15/6 and square root", &Rival::factored_15_6, factored, rivals, {}, exact);
+  fight(board, "UD 6/3 and square root", &Rival::factored_6_3, factored, rivals,
+        {{"mherb", 4152.0 / 400.0, 4152.0 / 350.0}}, exact);
+  fight(board, "UD 15/6 and square root", &Rival::factored_15_6, factored, rivals,
+        {{"mherb", 16941.0 / 3000.0, 16941.0 / 2400.0}}, exact);
   if (!agrees(us.kalman_6_3(steps), factored.factored_6_3(steps), 1e-9) ||
       !agrees(us.extended_15_6(steps), factored.factored_15_6(steps), 1e-9)) {
     std::fprintf(stderr, "scoreboard_filter: the UD form and the plain one differ\n");
     return 1;
   }
-  absolute(board, "UD 6/3", factored.factored_6_3, steps, 1.0, 400.0, 350.0);
-  absolute(board, "UD 15/6", factored.factored_15_6, steps, 1.0, 3000.0, 2400.0);
+  absolute(board, "UD 6/3", factored.factored_6_3, steps, 1.0, {}, {});
+  absolute(board, "UD 15/6", factored.factored_15_6, steps, 1.0, {}, {});
   return board.finish();
 }
