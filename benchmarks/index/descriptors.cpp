@@ -131,7 +131,8 @@ std::vector<Marked> marked_rivals(std::size_t dim, const std::vector<float>& bas
   std::vector<Marked> result;
   std::vector<std::unique_ptr<DescriptorRival>> rivals;
   rivals.push_back(make_flann_trees(dim, 4));
-  rivals.push_back(make_hnswlib(dim));
+  constexpr std::size_t largest_graph = 200000;  // a million take it a quarter of an hour to build
+  if (base.size() / dim <= largest_graph) rivals.push_back(make_hnswlib(dim));
   for (auto& rival : rivals) {
     if (!rival) continue;
     const double seconds = seconds_of([&] { rival->add(base.data(), base.size() / dim); });
