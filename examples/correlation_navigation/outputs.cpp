@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <iostream>
+#include <limits>
 #include <numbers>
 #include <system_error>
 
@@ -166,20 +167,40 @@ void add_planar(example::Report& page, const Results& r) {
 }
 
 #ifdef EXAMPLES_HAVE_PNG
+/// Columns and rows of a grid, ends excluded.
+struct Window {
+  int left = std::numeric_limits<int>::max(), right = 0, bottom = left, top = 0;
+
+  /// Takes in what is not void.
+  void widen(const cairn::FieldGrid& grid) {
+    for (int r = 0; r < grid.rows(); ++r)
+      for (int c = 0; c < grid.columns(); ++c)
+        if (!std::isnan(grid(c, r))) {
+          left = std::min(left, c);
+          right = std::max(right, c + 1);
+          bottom = std::min(bottom, r);
+          top = std::max(top, r + 1);
+        }
+  }
+};
+
 /// The two errors side by side, north up: the darker, the larger; white where nothing was mapped.
 void add_map_error(example::Report& page, const LoopResult& loop) {
   constexpr int gap = 8;
-  const cairn::FieldGrid& before = *loop.map_error_before;
-  cairn::Image image(2 * before.columns() + gap, before.rows(), 255);
-  int left = 0;
-  for (const cairn::FieldGrid* error : {&before, &*loop.map_error_after}) {
-    for (int r = 0; r < error->rows(); ++r)
-      for (int c = 0; c < error->columns(); ++c) {
+  Window window;
+  window.widen(*loop.map_error_before);
+  window.widen(*loop.map_error_after);
+  const int width = window.right - window.left;
+  cairn::Image image(2 * width + gap, window.top - window.bottom, 255);
+  int shift = -window.left;
+  for (const cairn::FieldGrid* error : {&*loop.map_error_before, &*loop.map_error_after}) {
+    for (int r = window.bottom; r < window.top; ++r)
+      for (int c = window.left; c < window.right; ++c) {
         const double size = std::abs((*error)(c, r)) / loop.field_deviation;
         if (!std::isnan(size))
-          image(left + c, error->rows() - 1 - r) = static_cast<std::uint8_t>(225 * (1 - std::min(1.0, size)));
+          image(shift + c, window.top - 1 - r) = static_cast<std::uint8_t>(225 * (1 - std::min(1.0, size)));
       }
-    left += before.columns() + gap;
+    shift += width + gap;
   }
   page.add(example::Picture{
       .title = "Error of the map, before and after",
