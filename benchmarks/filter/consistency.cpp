@@ -80,8 +80,8 @@ void table(const Scenario& scenario) {
       [](const auto& p, cairn::Random&) { return cairn::SquareRootInformation<X>::from(p).value(); });
   row("EnsembleKalman, 500 members", scenario, cairn::EnsembleKalman{},
       [](const auto& p, cairn::Random& random) { return cairn::Ensemble<X>::draw(p, 500, random); });
-  row("ParticleFilter, 2000 particles", scenario, cairn::ParticleFilter{},
-      [](const auto& p, cairn::Random& random) { return cairn::draw_particles(p, 2000, random); });
+  row("ParticleFilter, 10000 particles", scenario, cairn::ParticleFilter{},
+      [](const auto& p, cairn::Random& random) { return cairn::draw_particles(p, 10000, random); });
 }
 
 }  // namespace
