@@ -33,9 +33,8 @@ bool agrees(double ours, double theirs, double tolerance) {
   return std::abs(ours - theirs) <= tolerance * std::abs(ours);
 }
 
-// Nanoseconds were asked for on a certain machine, with a rival's beside them: their ratio holds on any.
-
-/// One problem: ours against all who solve it, one row a rival. What is owed is a ratio.
+/// One problem: ours against all who solve it, one row a rival. What is owed is a ratio: it holds on any
+/// machine.
 void fight(Scoreboard& board, const std::string& name, Run Rival::* problem, const Rival& us,
            const std::vector<Rival>& rivals, const std::vector<Owed>& owed, double tolerance) {
   const Run& run = us.*problem;

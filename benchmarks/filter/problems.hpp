@@ -7,6 +7,7 @@
 
 #include <array>
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include <cairn/core/random.hpp>
@@ -16,6 +17,8 @@
 #include <cairn/manifold/so2.hpp>
 #include <cairn/models/motion.hpp>
 #include <cairn/models/sensor.hpp>
+
+#include "rivals.hpp"
 
 namespace cairn_bench {
 
@@ -41,6 +44,22 @@ struct Still {
   [[nodiscard]] cairn::Identity<3> jacobian(const State&, const Control&, double) const { return {}; }
   [[nodiscard]] const cairn::Matrix<3>& noise(const State&, const Control&, double) const { return q; }
 };
+
+/// A library of linear filters whose matrices are given at run time. Solver::run<N, M>(F, Q, steps) sees the
+/// first M numbers of the state with unit noise, starts from unit covariance, and returns the last trace.
+template <class Solver>
+Rival linear_rival(const std::string& name) {
+  Rival rival{name};
+  rival.kalman_6_3 = [](int steps) {
+    const cairn::ConstantVelocity<3> process;
+    return Solver::template run<6, 3>(process.jacobian({}, {}, time_step), process.noise({}, {}, time_step),
+                                      steps);
+  };
+  rival.landmark_3_3 = [](int steps) {
+    return Solver::template run<3, 3>(cairn::Matrix<3>::Identity(), Still{}.q, steps);
+  };
+  return rival;
+}
 
 /// Where the vehicle starts.
 inline cairn::Vector<5> vehicle_start() {

@@ -41,40 +41,36 @@ MatrixWrapper::ColumnVector zeros(int n) {
   return result;
 }
 
-template <int N, int M>
-double run(const cairn::Matrix<N>& f, const cairn::Matrix<N>& q, int steps) {
-  static const auto z = noise<M>(64, 1.0);
-  BFL::LinearAnalyticConditionalGaussian motion(matrix_of(f), BFL::Gaussian(zeros(N), symmetric_of(q)));
-  BFL::LinearAnalyticSystemModelGaussianUncertainty process(&motion);
-  const cairn::Matrix<M, N> h = cairn::Matrix<M, N>::Identity();
-  const cairn::Matrix<M> r = cairn::Matrix<M>::Identity();
-  BFL::LinearAnalyticConditionalGaussian look(matrix_of(h), BFL::Gaussian(zeros(M), symmetric_of(r)));
-  BFL::LinearAnalyticMeasurementModelGaussianUncertainty sensor(&look);
-  BFL::Gaussian prior(zeros(N), symmetric_of(cairn::Matrix<N>::Identity()));
-  BFL::ExtendedKalmanFilter filter(&prior);
-  filter.AllocateMeasModelExt(M);
-  MatrixWrapper::ColumnVector seen = zeros(M);
-  for (int k = 0; k < steps; ++k) {
-    filter.Update(&process);
-    for (int i = 0; i < M; ++i) seen(static_cast<unsigned>(i + 1)) = z[static_cast<std::size_t>(k % 64)](i);
-    filter.Update(&sensor, seen);
+struct Bfl {
+  template <int N, int M>
+  static double run(const cairn::Matrix<N>& f, const cairn::Matrix<N>& q, int steps) {
+    static const auto z = noise<M>(64, 1.0);
+    BFL::LinearAnalyticConditionalGaussian motion(matrix_of(f), BFL::Gaussian(zeros(N), symmetric_of(q)));
+    BFL::LinearAnalyticSystemModelGaussianUncertainty process(&motion);
+    const cairn::Matrix<M, N> h = cairn::Matrix<M, N>::Identity();
+    const cairn::Matrix<M> r = cairn::Matrix<M>::Identity();
+    BFL::LinearAnalyticConditionalGaussian look(matrix_of(h), BFL::Gaussian(zeros(M), symmetric_of(r)));
+    BFL::LinearAnalyticMeasurementModelGaussianUncertainty sensor(&look);
+    BFL::Gaussian prior(zeros(N), symmetric_of(cairn::Matrix<N>::Identity()));
+    BFL::ExtendedKalmanFilter filter(&prior);
+    filter.AllocateMeasModelExt(M);
+    MatrixWrapper::ColumnVector seen = zeros(M);
+    for (int k = 0; k < steps; ++k) {
+      filter.Update(&process);
+      for (int i = 0; i < M; ++i) seen(static_cast<unsigned>(i + 1)) = z[static_cast<std::size_t>(k % 64)](i);
+      filter.Update(&sensor, seen);
+    }
+    double trace = 0;
+    const MatrixWrapper::SymmetricMatrix covariance = filter.PostGet()->CovarianceGet();
+    for (unsigned i = 1; i <= N; ++i) trace += covariance(i, i);
+    return trace;
   }
-  double trace = 0;
-  const MatrixWrapper::SymmetricMatrix covariance = filter.PostGet()->CovarianceGet();
-  for (unsigned i = 1; i <= N; ++i) trace += covariance(i, i);
-  return trace;
-}
+};
 
 }  // namespace
 
 Rival bfl() {
-  Rival rival{"BFL"};
-  rival.kalman_6_3 = [](int n) {
-    const cairn::ConstantVelocity<3> process;
-    return run<6, 3>(process.jacobian({}, {}, time_step), process.noise({}, {}, time_step), n);
-  };
-  rival.landmark_3_3 = [](int n) { return run<3, 3>(cairn::Matrix<3>::Identity(), Still{}.q, n); };
-  return rival;
+  return linear_rival<Bfl>("BFL");
 }
 
 }  // namespace cairn_bench

@@ -12,37 +12,33 @@
 namespace cairn_bench {
 namespace {
 
-template <int N, int M>
-double run(const cairn::Matrix<N>& f, const cairn::Matrix<N>& q, int steps) {
-  static const auto z = noise<M>(64, 1.0);
-  cv::KalmanFilter filter(N, M, 0, CV_64F);
-  cv::setIdentity(filter.measurementMatrix);
-  cv::setIdentity(filter.measurementNoiseCov);
-  cv::setIdentity(filter.errorCovPost);
-  for (int i = 0; i < N; ++i)
-    for (int j = 0; j < N; ++j) {
-      filter.transitionMatrix.at<double>(i, j) = f(i, j);
-      filter.processNoiseCov.at<double>(i, j) = q(i, j);
+struct OpenCv {
+  template <int N, int M>
+  static double run(const cairn::Matrix<N>& f, const cairn::Matrix<N>& q, int steps) {
+    static const auto z = noise<M>(64, 1.0);
+    cv::KalmanFilter filter(N, M, 0, CV_64F);
+    cv::setIdentity(filter.measurementMatrix);
+    cv::setIdentity(filter.measurementNoiseCov);
+    cv::setIdentity(filter.errorCovPost);
+    for (int i = 0; i < N; ++i)
+      for (int j = 0; j < N; ++j) {
+        filter.transitionMatrix.at<double>(i, j) = f(i, j);
+        filter.processNoiseCov.at<double>(i, j) = q(i, j);
+      }
+    cv::Mat seen(M, 1, CV_64F);
+    for (int k = 0; k < steps; ++k) {
+      filter.predict();
+      for (int i = 0; i < M; ++i) seen.at<double>(i) = z[static_cast<std::size_t>(k % 64)](i);
+      filter.correct(seen);
     }
-  cv::Mat seen(M, 1, CV_64F);
-  for (int k = 0; k < steps; ++k) {
-    filter.predict();
-    for (int i = 0; i < M; ++i) seen.at<double>(i) = z[static_cast<std::size_t>(k % 64)](i);
-    filter.correct(seen);
+    return cv::trace(filter.errorCovPost)[0];
   }
-  return cv::trace(filter.errorCovPost)[0];
-}
+};
 
 }  // namespace
 
 Rival opencv() {
-  Rival rival{"OpenCV"};
-  rival.kalman_6_3 = [](int n) {
-    const cairn::ConstantVelocity<3> process;
-    return run<6, 3>(process.jacobian({}, {}, time_step), process.noise({}, {}, time_step), n);
-  };
-  rival.landmark_3_3 = [](int n) { return run<3, 3>(cairn::Matrix<3>::Identity(), Still{}.q, n); };
-  return rival;
+  return linear_rival<OpenCv>("OpenCV");
 }
 
 }  // namespace cairn_bench

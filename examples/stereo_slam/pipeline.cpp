@@ -288,12 +288,15 @@ void Pipeline::move_to(const cairn::StereoPose& pose) {
   T_last_camera_ = T_world_camera_.inverse() * pose.T_world_camera;
   T_world_camera_ = pose.T_world_camera;
   pose_covariance_ = pose.covariance;
-  record_.frames.back().T_world_camera = T_world_camera_;
-  record_.frames.back().covariance = pose_covariance_;
+  record_pose();
 }
 
 void Pipeline::stay() {
   T_last_camera_ = cairn::SE3();
+  record_pose();
+}
+
+void Pipeline::record_pose() {
   record_.frames.back().T_world_camera = T_world_camera_;
   record_.frames.back().covariance = pose_covariance_;
 }

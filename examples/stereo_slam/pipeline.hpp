@@ -102,6 +102,7 @@ private:
   [[nodiscard]] std::optional<Located> locate(std::vector<Match>& matches) const;
   void move_to(const cairn::StereoPose& pose);
   void stay();
+  void record_pose();
   void refine_landmarks(const std::vector<Match>& agreed);
   void extend_map(const std::vector<Match>& agreed, const StereoFrame& frame);
   void close_step();

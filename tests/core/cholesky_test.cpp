@@ -1,9 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <doctest/doctest.h>
 
 #include <cairn/core/cholesky.hpp>
@@ -68,6 +70,8 @@ TEST_SUITE("Cholesky") {
     const Matrix<11> a = root * root.transpose();
     const Eigen::LLT<Matrix<cairn::dynamic>> peer(a);
     CHECK(Cholesky<11>(a).lower().isApprox(Matrix<cairn::dynamic>(peer.matrixL()), 1e-12));
+    CHECK(std::exp(Cholesky<11>(a).log_determinant()) ==
+          doctest::Approx(Matrix<cairn::dynamic>(a).determinant()).epsilon(1e-10));
   }
 
   TEST_CASE("says what is not positive definite, and then answers NaN") {
@@ -76,6 +80,7 @@ TEST_SUITE("Cholesky") {
     const auto refused = [](const Matrix<2>& a) {
       const Cholesky<2> factor(a);
       CHECK_FALSE(factor.inverse().allFinite());
+      CHECK(std::isnan(factor.log_determinant()));
       CHECK_FALSE(factor.solve(Vector<2>(1, 1)).allFinite());
       return !factor.good();
     };

@@ -3,7 +3,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <fstream>
 #include <span>
 #include <string>
 #include <vector>
@@ -15,6 +14,7 @@
 #include <cairn/index/principal_axes.hpp>
 #include <cairn/index/ratio_test.hpp>
 
+#include "index/bvecs.hpp"
 #include "index/generators.hpp"
 #include "support/data.hpp"
 #include "support/random.hpp"
@@ -27,20 +27,6 @@ std::vector<float> random_query(std::size_t dim, cairn::Random& random) {
   std::vector<float> query(dim);
   for (float& number : query) number = static_cast<float>(random.uniform(-0.2, 1.5));
   return query;
-}
-
-/// Vectors of bytes, each after its length, as one row of floats after the other.
-std::vector<float> read_bvecs(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::vector<float> rows;
-  std::vector<std::uint8_t> row;
-  std::int32_t dim = 0;
-  while (file.read(reinterpret_cast<char*>(&dim), 4)) {
-    row.resize(static_cast<std::size_t>(dim));
-    file.read(reinterpret_cast<char*>(row.data()), dim);
-    rows.insert(rows.end(), row.begin(), row.end());
-  }
-  return rows;
 }
 
 void turn(const cairn::PrincipalAxes& axes, std::vector<float>& rows) {
@@ -123,8 +109,8 @@ TEST_SUITE("best_bin_first") {
   TEST_CASE("best_bin_first: 128 leaves keep 98 of 100 ratio-test matches of real SIFT descriptors") {
     const auto folder = cairn_test::real_data("sift_99k");
     if (!folder) return;
-    auto base = read_bvecs(*folder / "base.bvecs");
-    auto queries = read_bvecs(*folder / "query.bvecs");
+    auto base = cairn_test::read_bvecs(*folder / "base.bvecs");
+    auto queries = cairn_test::read_bvecs(*folder / "query.bvecs");
     const cairn::PrincipalAxes axes(cairn::Rows<float>(base, 128));
     turn(axes, base);
     turn(axes, queries);

@@ -27,14 +27,14 @@ public:
   explicit Cholesky(const Matrix<N, N, S>& a) : lower_(a) {
     using std::sqrt;
     const int n = size();
-    for (int j = 0; j < n && good_; ++j) {
+    for (int j = 0; j < n; ++j) {
       const S diagonal = lower_(j, j);
       for (int k = 0; k < j; ++k) {
         const S factor = lower_(j, k);
         for (int i = j; i < n; ++i) lower_(i, j) -= lower_(i, k) * factor;
       }
       const S pivot = lower_(j, j);
-      good_ = pivot > S(0) && pivot < std::numeric_limits<S>::infinity();  // false for NaN
+      good_ = pivot > S(0) && pivot - pivot == S(0);  // false for NaN and infinity
       if (!good_) break;
       least_share_ = std::min(least_share_, pivot / diagonal);
       const S root = sqrt(pivot), inverse = S(1) / root;
@@ -42,7 +42,7 @@ public:
       for (int i = j + 1; i < n; ++i) lower_(i, j) *= inverse;
       for (int i = 0; i < j; ++i) lower_(i, j) = S(0);
     }
-    if (!good_) lower_.setConstant(std::numeric_limits<S>::quiet_NaN());
+    if (!good_) lower_.setConstant(S(std::numeric_limits<double>::quiet_NaN()));
   }
 
   /// False where the matrix is not finite and positive definite; then all that is asked below is NaN.
@@ -83,6 +83,14 @@ public:
   [[nodiscard]] Matrix<N, C, S> unwhiten(Matrix<N, C, S> b) const {
     backward(b);
     return b;
+  }
+
+  /// Natural logarithm of det A. O(N).
+  [[nodiscard]] S log_determinant() const {
+    using std::log;
+    S sum(0);
+    for (int i = 0; i < size(); ++i) sum += log(lower_(i, i));
+    return S(2) * sum;
   }
 
   /// A^-1, symmetric bit for bit. O(N^3).

@@ -71,7 +71,7 @@ template <int M, class S, class P>
                                                         double gate) {
   if (!(gate > 0.0)) return Status::bad_option;
   if (!all_finite(in.residual) || !all_finite(in.covariance) || !all_finite(prior)) return Status::not_finite;
-  if (!finite(log_determinant<M, S>(in.covariance))) return Status::not_positive_definite;
+  if (!Cholesky<M, S>(in.covariance).good()) return Status::not_positive_definite;
   if (in.nis > static_cast<S>(gate)) return Status::gated;
   return finite(in.nis) ? Status::not_positive_definite : Status::not_finite;
 }

@@ -8,10 +8,10 @@
 #pragma once
 
 #include <cmath>
-#include <limits>
 
 #include <Eigen/Core>
 
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/version.hpp>
 
@@ -58,27 +58,6 @@ enum class [[nodiscard]] Status {
   return "unknown status";
 }
 
-namespace detail {
-
-/// log det of a symmetric positive definite matrix; NaN where it is not.
-template <int M, class S>
-[[nodiscard]] S log_determinant(const Matrix<M, M, S>& a) {
-  using std::log;
-  const int m = static_cast<int>(a.rows());
-  Matrix<M, M, S> lower = a;
-  S sum(0);
-  for (int j = 0; j < m; ++j) {
-    const S pivot = lower(j, j);
-    if (!(pivot > S(0))) return std::numeric_limits<S>::quiet_NaN();
-    sum += log(pivot);
-    for (int k = j + 1; k < m; ++k)
-      for (int i = k; i < m; ++i) lower(i, k) -= lower(i, j) * lower(k, j) / pivot;
-  }
-  return sum;
-}
-
-}  // namespace detail
-
 /// What a measurement of M numbers brought: residual z - h(x) (a tangent vector), its predicted covariance
 /// S = H P H^T + R, and nis = residual^T S^-1 residual, which is chi-square of M degrees of freedom when the
 /// filter is consistent. Where the status is not accepted, later fields may not have been computed (zero).
@@ -96,8 +75,8 @@ struct [[nodiscard]] Innovation {
   [[nodiscard]] S log_likelihood() const {
     const S two_pi = S(6.283185307179586476925286766559L);
     using std::log;
-    return S(-0.5) *
-           (nis + detail::log_determinant(covariance) + S(static_cast<int>(residual.size())) * log(two_pi));
+    return S(-0.5) * (nis + Cholesky<M, S>(covariance).log_determinant() +
+                      S(static_cast<int>(residual.size())) * log(two_pi));
   }
 };
 

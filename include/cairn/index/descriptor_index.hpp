@@ -1,0 +1,329 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// An index of descriptors (tens to hundreds of numbers) for a search under a budget: one byte a coordinate,
+/// in cells around means, and the caller's points for the last word.
+///
+///   const cairn::DescriptorIndex index(descriptors);        // refers to them; a quarter of their memory
+///   cairn::DescriptorIndex<...>::Search search;             // one a thread
+///   cairn::NearestTwo<float> two;
+///   search.search(index, query, two, {.leaves = 64});
+///
+/// The cells begin as those of a kd-tree and are moved to their means (mean_cells.hpp). A query asks for its
+/// distance from all means and scans the nearest cells first (an inverted file: Jegou, Douze, Schmid,
+/// "Product quantization for nearest neighbor search", IEEE PAMI 33, 2011, section IV): in so many dimensions
+/// the distance from a cell's middle says more about where near points are than that from its border.
+///
+/// A coordinate x of axis a is kept as round(s (x - low[a])) with one s for all axes, so that distances keep
+/// their proportions. How far bytes are from their points is known: whoever may be nearer than the
+/// collector's limit by that much is measured again, exactly; where the bytes are the points (SIFT), nobody
+/// is. Without a budget the answers are those of BruteForce. Euclidean distances only.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include <cairn/core/check.hpp>
+#include <cairn/index/best_bin_first.hpp>
+#include <cairn/index/byte_blocks.hpp>
+#include <cairn/index/mean_cells.hpp>
+#include <cairn/index/metric.hpp>
+#include <cairn/index/neighbors.hpp>
+#include <cairn/index/points.hpp>
+
+namespace cairn::inline CAIRN_ABI {
+
+struct DescriptorIndexOptions {
+  /// Mean number of points in a cell, up to a factor of 1.5. 0: sqrt(n) / 6, but at least 32, where scanning
+  /// the means costs about as much as scanning the cells.
+  std::size_t points_in_cell = 0;
+  unsigned rounds = 5;   ///< of moving the cells to their means; 0 leaves the kd-tree's
+  unsigned threads = 1;  ///< of the build; the index is the same for any number (0 counts as 1)
+};
+
+/// Const methods may run at the same time. The points must stay as they are while the index is used.
+template <PointSet Points>
+class DescriptorIndex {
+public:
+  using Real = float;
+
+  /// Throws Error, naming the point, for coordinates that are not finite, for points of different dimensions,
+  /// and for more than 16384 dimensions. O(n log n + cells^2).
+  explicit DescriptorIndex(const Points& points, const DescriptorIndexOptions& options = {})
+      : points_(&points), size_(static_cast<std::size_t>(points.size())) {
+    if (empty()) return;
+    detail::check_count(size_, "DescriptorIndex: point");
+    low_.resize(detail::dimension_of<dynamic_dim>(points));
+    if (dimension() > detail::most_byte_axes)
+      raise("DescriptorIndex: a point may have 16384 coordinates at most, got " +
+            std::to_string(dimension()));
+    const auto rows = detail::copy_points<float>(points, dimension(), "DescriptorIndex: point");
+    const std::vector<std::uint8_t> codes = encode(rows);
+    const std::size_t in_cell =
+        options.points_in_cell > 0
+            ? options.points_in_cell
+            : std::max<std::size_t>(2 * detail::block_size,
+                                    static_cast<std::size_t>(std::sqrt(static_cast<double>(size_)) / 6));
+    detail::MeanCellsBuilder builder(codes, dimension(), options.threads);
+    fill(codes, builder.build(depth_for(in_cell), options.rounds));
+  }
+  explicit DescriptorIndex(const Points&&, const DescriptorIndexOptions& = {}) = delete;  ///< would be gone
+
+  [[nodiscard]] std::size_t size() const noexcept { return size_; }
+  [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
+  [[nodiscard]] std::size_t dimension() const noexcept { return low_.size(); }
+  [[nodiscard]] std::size_t cells() const noexcept { return radii_.size(); }
+  /// True where every coordinate is a byte's value exactly, so that distances of bytes are distances.
+  [[nodiscard]] bool bytes_are_exact() const noexcept { return error_ == 0; }
+  /// Memory held, the caller's points not included.
+  [[nodiscard]] std::size_t bytes() const noexcept {
+    return members_.bytes() + means_.bytes() + ids_.capacity() * sizeof(PointId) +
+           first_block_.capacity() * sizeof(std::size_t) +
+           (radii_.capacity() + low_.capacity()) * sizeof(float);
+  }
+
+  /// Searches under a budget; keep one for many searches, one a thread.
+  class Search {
+  public:
+    /// Offers points with their exact reduced distances, until none can be nearer than the collector's limit
+    /// or the budget is spent. Returns true where nothing was left out. Throws Error where the query is not
+    /// finite or of another dimension. `measured`, where given, counts distances of floats.
+    template <Point Query, Collector<float> C>
+    bool search(const DescriptorIndex& index, const Query& query, C& collector, Budget budget = {},
+                Work* work = nullptr, std::size_t* measured = nullptr) {
+      if (index.empty()) return true;
+      row_.resize(index.dimension());
+      codes_.resize(index.dimension());
+      detail::copy_point<float>(query, row_.size(), row_.data(), {"DescriptorIndex: query", 0});
+      const float error = index.encode(row_.data(), codes_.data());
+      query_.set(codes_.data(), codes_.size());
+      cells_.resize(index.cells());
+      index.means_.distances(0, index.means_.blocks(), query_, cells_.keys());
+      cells_.reset();
+      Offer<C> offer(index, row_.data(), error, collector);
+      Work done{.nodes = index.means_.blocks()};
+      const bool all = scan_cells(index, offer, budget.leaves, done);
+      if (work != nullptr) *work += done;
+      if (measured != nullptr) *measured += offer.measured();
+      return all;
+    }
+
+  private:
+    template <class O>
+    bool scan_cells(const DescriptorIndex& index, O& offer, std::size_t left, Work& done) {
+      auto cell = cells_.next();
+      while (cell.place != detail::SmallestFirst::none) {
+        if (left == 0) return false;
+        const auto after = cells_.next();
+        if (after.place != detail::SmallestFirst::none)
+          index.members_.prefetch(index.first_block_[after.place]);
+        if (offer.may_hold_nearer(std::sqrt(static_cast<float>(cell.key)) - index.radii_[cell.place])) {
+          const std::size_t begin = index.first_block_[cell.place];
+          const std::size_t blocks = index.first_block_[cell.place + 1] - begin;
+          const std::size_t scanned = std::min(left, blocks);
+          scan(index, begin, scanned, offer);
+          done.leaves += scanned;
+          done.distances += scanned * detail::block_size;
+          left -= scanned;
+          if (scanned < blocks) return false;
+        }
+        cell = after;
+      }
+      return true;
+    }
+
+    template <class O>
+    void scan(const DescriptorIndex& index, std::size_t block, std::size_t count, O& offer) const {
+      constexpr std::size_t at_once = 8;
+      std::int32_t distances[at_once * detail::block_size];
+      for (const std::size_t end = block + count; block < end;) {
+        const std::size_t now = std::min(at_once, end - block);
+        index.members_.distances(block, now, query_, distances);
+        for (std::size_t i = 0; i < now; ++i, ++block)
+          offer.block(distances + i * detail::block_size, index.ids_.data() + block * detail::block_size);
+      }
+    }
+
+    std::vector<float> row_;
+    std::vector<std::uint8_t> codes_;
+    detail::ByteQuery query_;
+    detail::SmallestFirst cells_;
+  };
+
+private:
+  /// Passes on to a collector whoever the bytes cannot exclude.
+  template <class C>
+  class Offer {
+  public:
+    Offer(const DescriptorIndex& index, const float* query, float error, C& collector)
+        : index_(index),
+          query_(query),
+          collector_(collector),
+          slack_(error + index.error_),
+          growth_(1.0001F + static_cast<float>(index.dimension()) * std::numeric_limits<float>::epsilon()) {
+      tighten();
+    }
+
+    [[nodiscard]] std::size_t measured() const noexcept { return measured_; }
+
+    /// Whether a point that is so far away, in bytes, may be below the limit.
+    [[nodiscard]] bool may_hold_nearer(float bytes) const noexcept { return bytes < reach_; }
+
+    void block(const std::int32_t* distances, const PointId* ids) {
+      unsigned mask = 0;
+      const std::int32_t below = below_;
+      detail::with_widest_lanes([&]() CAIRN_INLINED {
+        detail::Block<std::int32_t> numbers;
+        detail::load_block<std::int32_t>(distances, numbers);
+        mask = detail::mask_below<std::int32_t>(numbers, below);
+      });
+      for (; mask != 0; mask &= mask - 1) {
+        const auto lane = static_cast<unsigned>(std::countr_zero(mask));
+        if (distances[lane] < below_ && ids[lane] != no_point) point(distances[lane], ids[lane]);
+      }
+    }
+
+  private:
+    void point(std::int32_t bytes, PointId id) {
+      float reduced = 0;
+      if (slack_ == 0) {
+        reduced = static_cast<float>(bytes) * index_.unit_ * index_.unit_;
+      } else {
+        ++measured_;
+        reduced = index_.reduced_distance(query_, id);
+      }
+      if (!(reduced < static_cast<float>(collector_.limit()))) return;
+      collector_.offer(id, reduced);
+      tighten();
+    }
+
+    /// The collector's limit in the units of the bytes, and what rounding can hide.
+    void tighten() {
+      const float distance = std::sqrt(static_cast<float>(collector_.limit())) / index_.unit_;
+      reach_ = distance * growth_ + slack_;
+      const float square = reach_ * reach_ + 1;
+      constexpr float most = 2147483520.0F;  // the largest float below 2^31
+      below_ =
+          square < most ? static_cast<std::int32_t>(square) + 1 : std::numeric_limits<std::int32_t>::max();
+    }
+
+    const DescriptorIndex& index_;
+    const float* query_;
+    C& collector_;
+    float slack_;   ///< how far the bytes of query and point together may be from them, in bytes
+    float growth_;  ///< covers the rounding of sums
+    float reach_ = 0;
+    std::int32_t below_ = 0;
+    std::size_t measured_ = 0;
+  };
+
+  /// How often the points are halved for so many in a cell.
+  [[nodiscard]] unsigned depth_for(std::size_t in_cell) const noexcept {
+    const double cells = static_cast<double>(size_) / static_cast<double>(in_cell);
+    const auto wished = static_cast<unsigned>(std::lround(std::log2(std::max(1.0, cells))));
+    return std::min(wished, static_cast<unsigned>(std::bit_width(size_)) - 1);
+  }
+
+  /// Learns low_, unit_ and error_, and returns the bytes of all points.
+  [[nodiscard]] std::vector<std::uint8_t> encode(const std::vector<float>& rows) {
+    const std::size_t dim = dimension();
+    low_.assign(rows.begin(), rows.begin() + static_cast<std::ptrdiff_t>(dim));
+    std::vector<float> high = low_;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      low_[i % dim] = std::min(low_[i % dim], rows[i]);
+      high[i % dim] = std::max(high[i % dim], rows[i]);
+    }
+    float range = 0;
+    for (std::size_t a = 0; a < dim; ++a) range = std::max(range, high[a] - low_[a]);
+    const float finest = range > 1e-18F ? range / 255 : 1;  // nearer points are all zeros, and measured
+    std::vector<std::uint8_t> codes(rows.size());
+    // Whole numbers, and their halves and quarters, are met exactly by the next power of two.
+    for (const float unit : {std::exp2(std::ceil(std::log2(finest))), finest}) {
+      unit_ = unit;
+      error_ = 0;
+      for (std::size_t i = 0; i < rows.size(); i += dim) {
+        const float error = encode(&rows[i], &codes[i]);
+        if (error > 0 && unit > finest) {
+          error_ = error;
+          break;
+        }
+        error_ = std::max(error_, error);
+      }
+      if (error_ == 0) break;
+    }
+    return codes;
+  }
+
+  /// Writes the bytes of a point; returns how far they are from it, in bytes, rounded up.
+  float encode(const float* row, std::uint8_t* codes) const noexcept {
+    float sum = 0;
+    bool exact = true;
+    for (std::size_t a = 0; a < dimension(); ++a) {
+      // A query may be far away: then it is moved nearer to all bytes alike.
+      const float scaled = std::clamp((row[a] - low_[a]) / unit_, -1e15F, 1e15F);
+      const float code = std::clamp(std::floor(scaled + 0.5F), 0.0F, 255.0F);
+      codes[a] = static_cast<std::uint8_t>(code);
+      sum += (scaled - code) * (scaled - code);
+      exact = exact && scaled == code;
+    }
+    return exact ? 0 : std::sqrt(sum) * 1.001F + 1e-3F;
+  }
+
+  void fill(const std::vector<std::uint8_t>& codes, const detail::MeanCells& cells) {
+    const std::size_t dim = dimension();
+    means_ = detail::ByteBlocks(dim, (cells.size() + detail::block_size - 1) / detail::block_size);
+    for (std::size_t place = 0; place < means_.blocks() * detail::block_size; ++place)
+      means_.set(place, &cells.means[std::min(place, cells.size() - 1) * dim]);
+    first_block_.assign(cells.size() + 1, 0);
+    for (std::size_t c = 0; c < cells.size(); ++c)
+      first_block_[c + 1] = first_block_[c] + (cells.first[c + 1] - cells.first[c] + detail::block_size - 1) /
+                                                  detail::block_size;
+    members_ = detail::ByteBlocks(dim, first_block_.back());
+    ids_.assign(first_block_.back() * detail::block_size, no_point);
+    radii_.assign(cells.size(), 0);
+    detail::ByteQuery mean;
+    std::vector<std::int32_t> distances;
+    for (std::size_t c = 0; c < cells.size(); ++c) {
+      const std::size_t count = cells.first[c + 1] - cells.first[c];
+      const std::size_t blocks = first_block_[c + 1] - first_block_[c];
+      for (std::size_t i = 0; i < blocks * detail::block_size; ++i) {
+        const std::size_t point = cells.order[cells.first[c] + std::min(i, count - 1)];
+        members_.set(first_block_[c] * detail::block_size + i, &codes[point * dim]);
+        if (i < count) ids_[first_block_[c] * detail::block_size + i] = static_cast<PointId>(point);
+      }
+      mean.set(&cells.means[c * dim], dim);
+      distances.resize(blocks * detail::block_size);
+      members_.distances(first_block_[c], blocks, mean, distances.data());
+      const auto farthest = *std::max_element(distances.begin(), distances.end());
+      radii_[c] = std::sqrt(static_cast<float>(farthest)) * 1.0001F;
+    }
+  }
+
+  [[nodiscard]] float reduced_distance(const float* query, PointId id) const {
+    const auto& point = (*points_)[id];
+    float sum = 0;
+    for (std::size_t a = 0; a < dimension(); ++a)
+      L2::accumulate(sum, query[a] - detail::coordinate<float>(point, a), a);
+    return sum;
+  }
+
+  const Points* points_;
+  std::size_t size_ = 0;
+  std::vector<float> low_;
+  float unit_ = 1;   ///< what a byte's step is worth
+  float error_ = 0;  ///< how far the bytes of any point are from it at most, in bytes
+  detail::ByteBlocks means_;
+  detail::ByteBlocks members_;
+  std::vector<PointId> ids_;
+  std::vector<std::size_t> first_block_;  ///< of each cell, and the end
+  std::vector<float> radii_;              ///< how far a cell's points are from its mean at most, in bytes
+};
+
+}  // namespace cairn::inline CAIRN_ABI

@@ -1,0 +1,109 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include <cairn/core/random.hpp>
+#include <cairn/index/byte_blocks.hpp>
+
+#include "support/random.hpp"
+
+namespace detail = cairn::detail;
+
+namespace {
+
+std::vector<std::uint8_t> drawn(std::size_t count, cairn::Random& random) {
+  std::vector<std::uint8_t> codes(count);
+  for (std::uint8_t& code : codes) {
+    const std::uint64_t number = random.below(300);  // the ends of the range often
+    code = static_cast<std::uint8_t>(number < 256 ? number : number % 2 * 255);
+  }
+  return codes;
+}
+
+std::int32_t by_definition(const std::uint8_t* a, const std::uint8_t* b, std::size_t dim) {
+  std::int32_t sum = 0;
+  for (std::size_t i = 0; i < dim; ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
+  return sum;
+}
+
+/// Wrong distances of some blocks, with the lanes in force.
+std::size_t wrong_distances(std::size_t dim, std::size_t blocks, cairn::Random& random) {
+  const std::size_t count = blocks * detail::block_size;
+  const auto codes = drawn(count * dim, random);
+  const auto point = drawn(dim, random);
+  detail::ByteBlocks all(dim, blocks);
+  for (std::size_t i = 0; i < count; ++i) all.set(i, &codes[i * dim]);
+  detail::ByteQuery query;
+  query.set(point.data(), dim);
+  std::vector<std::int32_t> distances(count);
+  all.distances(0, blocks, query, distances.data());
+  std::size_t wrong = 0;
+  for (std::size_t i = 0; i < count; ++i)
+    wrong += distances[i] != by_definition(point.data(), &codes[i * dim], dim);
+  return wrong;
+}
+
+}  // namespace
+
+TEST_SUITE("byte_blocks") {
+  TEST_CASE("distances are exact, whatever the processor offers and the number of coordinates") {
+    cairn::Random random(cairn_test::seed(86));
+    const auto all_right = [&] {
+      for (std::size_t dim = 1; dim <= 130; ++dim) CHECK(wrong_distances(dim, dim % 3 + 1, random) == 0);
+      CHECK(wrong_distances(detail::most_byte_axes, 1, random) == 0);
+    };
+    all_right();
+#if defined(__x86_64__)
+    const auto widest = detail::lane_width();
+    for (int width = 0; width < static_cast<int>(widest); ++width) {
+      detail::lane_width() = static_cast<detail::LaneWidth>(width);
+      all_right();
+    }
+    detail::lane_width() = widest;
+#endif
+  }
+
+  TEST_CASE("the farthest points of the most coordinates fit 32 bits") {
+    const std::size_t dim = detail::most_byte_axes;
+    const std::vector<std::uint8_t> low(dim, 0), high(dim, 255);
+    detail::ByteBlocks block(dim, 1);
+    for (std::size_t lane = 0; lane < detail::block_size; ++lane)
+      block.set(lane, lane % 2 == 0 ? low.data() : high.data());
+    detail::ByteQuery query;
+    std::int32_t distances[detail::block_size];
+    const auto most = static_cast<std::int32_t>(255 * 255 * dim);
+    for (const bool from_high : {false, true}) {
+      query.set(from_high ? high.data() : low.data(), dim);
+      block.distances(0, 1, query, distances);
+      CHECK(distances[0] == (from_high ? most : 0));
+      CHECK(distances[1] == (from_high ? 0 : most));
+    }
+  }
+
+  TEST_CASE("SmallestFirst: the order of a stable sort") {
+    cairn::Random random(cairn_test::seed(87));
+    detail::SmallestFirst smallest;
+    for (const std::size_t count : {1U, 15U, 16U, 17U, 300U, 5000U}) {
+      std::vector<std::int32_t> numbers(count);
+      for (std::int32_t& number : numbers) number = static_cast<std::int32_t>(random.below(count));
+      smallest.resize(count);
+      std::copy(numbers.begin(), numbers.end(), smallest.keys());
+      smallest.reset();
+      std::vector<std::size_t> order(count);
+      for (std::size_t i = 0; i < count; ++i) order[i] = i;
+      std::stable_sort(order.begin(), order.end(),
+                       [&](std::size_t a, std::size_t b) { return numbers[a] < numbers[b]; });
+      for (const std::size_t place : order) {
+        const auto item = smallest.next();
+        REQUIRE(item.place == place);
+        REQUIRE(item.key == numbers[place]);
+      }
+      CHECK(smallest.next().place == detail::SmallestFirst::none);
+    }
+  }
+}
