@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 #include <span>
+#include <tuple>
 #include <vector>
 
 namespace vision_bench {
@@ -72,8 +73,9 @@ Assignment assign(const std::vector<Spot>& a, const std::vector<Spot>& b,
   for (std::size_t i = 0; i < a.size(); ++i)
     for (std::size_t j = 0; j < b.size(); ++j)
       if (const double c = cost(a[i], b[j]); std::isfinite(c)) candidates.push_back({c, i, j});
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const Candidate& x, const Candidate& y) { return x.cost < y.cost; });
+  std::sort(candidates.begin(), candidates.end(), [](const Candidate& x, const Candidate& y) {
+    return std::tie(x.cost, x.i, x.j) < std::tie(y.cost, y.i, y.j);
+  });
   std::vector<bool> used_a(a.size(), false), used_b(b.size(), false);
   Assignment result;
   for (const Candidate& candidate : candidates) {

@@ -45,13 +45,6 @@ void* operator new(std::size_t size) {
 void* operator new(std::size_t size, std::align_val_t alignment) {
   return taken(size, static_cast<std::size_t>(alignment));
 }
-// std::stable_sort asks so, and does without where there is nothing.
-void* operator new(std::size_t size, const std::nothrow_t&) noexcept {
-  return is_refused() ? nullptr : std::aligned_alloc(16, (size + 16) / 16 * 16);
-}
-void operator delete(void* memory, const std::nothrow_t&) noexcept {
-  std::free(memory);
-}
 void operator delete(void* memory) noexcept {
   std::free(memory);
 }

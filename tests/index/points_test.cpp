@@ -10,10 +10,10 @@
 #include <Eigen/Core>
 #include <doctest/doctest.h>
 
+#include <cairn/index/descriptor_index.hpp>
 #include <cairn/index/kd_tree.hpp>
 #include <cairn/index/multi_kd_tree.hpp>
 #include <cairn/index/points.hpp>
-#include <cairn/index/quantised_tree.hpp>
 
 #include "support/folder.hpp"
 
@@ -102,8 +102,7 @@ TEST_SUITE("points") {
     const Endless endless{std::size_t{1} << 32};
     const std::string words = "at most 2^32 - 2 points can be numbered, got 4294967296";
     CHECK(message_of([&] { Tree tree(endless); }).find(words) != std::string::npos);
-    CHECK(message_of([&] { cairn::QuantisedTree<Endless, 3> tree(endless); }).find(words) !=
-          std::string::npos);
+    CHECK(message_of([&] { cairn::DescriptorIndex index(endless); }).find(words) != std::string::npos);
     cairn::MultiKdTree<float, 3> forest;
     CHECK(message_of([&] { forest.insert(endless); }).find("4294967296 points after 0 ids") !=
           std::string::npos);

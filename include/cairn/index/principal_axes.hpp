@@ -110,8 +110,9 @@ private:
   void store(const std::vector<double>& matrix, const std::vector<double>& vectors) {
     std::vector<std::size_t> order(dim_);
     std::iota(order.begin(), order.end(), std::size_t{0});
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-      return matrix[a * dim_ + a] > matrix[b * dim_ + b];
+    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      const double of_a = matrix[a * dim_ + a], of_b = matrix[b * dim_ + b];
+      return of_a > of_b || (of_a == of_b && a < b);
     });
     columns_.resize(dim_ * dim_);
     for (std::size_t i = 0; i < dim_; ++i)

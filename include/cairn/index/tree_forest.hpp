@@ -188,10 +188,10 @@ private:
     view_.clear();
     stored_ = 0;
     for (const TreePointer& tree : resting_) view_.push_back(tree.get());
+    const auto smaller = [](const Tree* a, const Tree* b) { return a->size() < b->size(); };
     for (const auto& merge : merges_)
-      for (const TreePointer& tree : merge.sources()) view_.push_back(tree.get());
-    std::stable_sort(view_.begin(), view_.end(),
-                     [](const Tree* a, const Tree* b) { return a->size() < b->size(); });
+      for (const TreePointer& tree : merge.sources())
+        view_.insert(std::upper_bound(view_.begin(), view_.end(), tree.get(), smaller), tree.get());
     for (const Tree* tree : view_) stored_ += tree->size();
   }
 
