@@ -10,6 +10,7 @@
 /// elsewhere differences are squared in 16 bits. Whole numbers: every path gives the same bits.
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -68,45 +69,64 @@ struct ByteBlockRange {
 };
 
 #if defined(__x86_64__)
+/// Four coordinates of the query in every lane.
+[[nodiscard, gnu::always_inline]] inline std::int32_t lane_of(const void* coordinates,
+                                                              std::size_t group) noexcept {
+  std::int32_t four = 0;
+  std::memcpy(&four, static_cast<const char*>(coordinates) + group * lane_axes, sizeof(four));
+  return four;
+}
+
 [[gnu::target("avx512f,avx512bw,avx512vl,avx512vnni")]] inline void byte_distances_vnni(
     const ByteBlockRange& blocks, const ByteQuery& query, std::int32_t* distances) noexcept {
   const std::uint8_t* line = blocks.codes;
   const __m512i square = _mm512_set1_epi32(query.square());
   for (std::size_t block = 0; block < blocks.count; ++block) {
-    __m512i products[2] = {_mm512_setzero_si512(), _mm512_setzero_si512()};  // two chains hide the latency
-    for (std::size_t group = 0; group < blocks.groups; ++group, line += 64) {
-      std::int32_t four = 0;
-      std::memcpy(&four, query.shifted() + group * lane_axes, sizeof(four));
-      products[group % 2] =
-          _mm512_dpbusd_epi32(products[group % 2], _mm512_loadu_si512(line), _mm512_set1_epi32(four));
+    __m512i product = _mm512_setzero_si512();  // two sums, to hide the latency of one
+    __m512i other = _mm512_setzero_si512();
+    std::size_t group = 0;
+    for (; group + 1 < blocks.groups; group += 2, line += 128) {
+      product = _mm512_dpbusd_epi32(product, _mm512_loadu_si512(line),
+                                    _mm512_set1_epi32(lane_of(query.shifted(), group)));
+      other = _mm512_dpbusd_epi32(other, _mm512_loadu_si512(line + 64),
+                                  _mm512_set1_epi32(lane_of(query.shifted(), group + 1)));
     }
-    const __m512i product = _mm512_add_epi32(products[0], products[1]);
+    if (group < blocks.groups) {
+      product = _mm512_dpbusd_epi32(product, _mm512_loadu_si512(line),
+                                    _mm512_set1_epi32(lane_of(query.shifted(), group)));
+      line += 64;
+    }
+    product = _mm512_add_epi32(product, other);
     const __m512i constant = _mm512_loadu_si512(blocks.constants + block * block_size);
     _mm512_storeu_si512(distances + block * block_size, _mm512_sub_epi32(_mm512_add_epi32(constant, square),
                                                                          _mm512_add_epi32(product, product)));
   }
 }
 
+/// Squared differences of eight points' four coordinates from the query's.
+[[nodiscard, gnu::target("avx2"), gnu::always_inline]] inline __m256i byte_squares_avx2(
+    const std::uint8_t* line, const __m256i& even_from, const __m256i& odd_from) noexcept {
+  const __m256i codes = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(line));
+  const __m256i even = _mm256_sub_epi16(_mm256_and_si256(codes, _mm256_set1_epi16(255)), even_from);
+  const __m256i odd = _mm256_sub_epi16(_mm256_srli_epi16(codes, 8), odd_from);
+  return _mm256_add_epi32(_mm256_madd_epi16(even, even), _mm256_madd_epi16(odd, odd));
+}
+
 [[gnu::target("avx2")]] inline void byte_distances_avx2(const ByteBlockRange& blocks, const ByteQuery& query,
                                                         std::int32_t* distances) noexcept {
-  const __m256i low_byte = _mm256_set1_epi16(255);
   const std::uint8_t* line = blocks.codes;
   for (std::size_t block = 0; block < blocks.count; ++block) {
-    __m256i sums[2] = {_mm256_setzero_si256(), _mm256_setzero_si256()};
+    __m256i low = _mm256_setzero_si256(), high = _mm256_setzero_si256();
     for (std::size_t group = 0; group < blocks.groups; ++group, line += 64) {
-      std::int32_t four = 0;
-      std::memcpy(&four, query.codes() + group * lane_axes, sizeof(four));
-      const __m256i from = _mm256_set1_epi32(four);
-      const __m256i even_from = _mm256_and_si256(from, low_byte), odd_from = _mm256_srli_epi16(from, 8);
-      for (std::size_t half = 0; half < 2; ++half) {
-        const __m256i codes = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(line + 32 * half));
-        const __m256i even = _mm256_sub_epi16(_mm256_and_si256(codes, low_byte), even_from);
-        const __m256i odd = _mm256_sub_epi16(_mm256_srli_epi16(codes, 8), odd_from);
-        sums[half] = _mm256_add_epi32(
-            sums[half], _mm256_add_epi32(_mm256_madd_epi16(even, even), _mm256_madd_epi16(odd, odd)));
-      }
+      const __m256i from = _mm256_set1_epi32(lane_of(query.codes(), group));
+      const __m256i even_from = _mm256_and_si256(from, _mm256_set1_epi16(255));
+      const __m256i odd_from = _mm256_srli_epi16(from, 8);
+      low = _mm256_add_epi32(low, byte_squares_avx2(line, even_from, odd_from));
+      high = _mm256_add_epi32(high, byte_squares_avx2(line + 32, even_from, odd_from));
     }
-    std::memcpy(distances + block * block_size, sums, sizeof(sums));
+    std::int32_t* to = distances + block * block_size;
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), low);
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + 8), high);
   }
 }
 
@@ -180,10 +200,11 @@ public:
     byte_distances_plain(range, query, distances);
   }
 
-  /// Asks for the first lines of a block ahead of its use.
-  void prefetch(std::size_t block) const noexcept {
-    const std::uint8_t* line = codes_.data() + block * groups() * 64;
-    for (std::size_t i = 0; i < groups() && i < 16; ++i) __builtin_prefetch(line + 64 * i);
+  /// Asks for some blocks ahead of their use; the processor follows by itself from a few kilobytes on.
+  void prefetch(std::size_t first, std::size_t count) const noexcept {
+    const std::uint8_t* line = codes_.data() + first * groups() * 64;
+    const std::size_t lines = std::min<std::size_t>(count * groups(), 64);
+    for (std::size_t i = 0; i < lines; ++i) __builtin_prefetch(line + 64 * i);
   }
 
 private:

@@ -123,10 +123,10 @@ public:
         if (left == 0) return false;
         const auto after = cells_.next();
         if (after.place != detail::SmallestFirst::none)
-          index.members_.prefetch(index.first_block_[after.place]);
+          index.members_.prefetch(index.first_block_[after.place], index.blocks_of(after.place));
         if (offer.may_hold_nearer(std::sqrt(static_cast<float>(cell.key)) - index.radii_[cell.place])) {
           const std::size_t begin = index.first_block_[cell.place];
-          const std::size_t blocks = index.first_block_[cell.place + 1] - begin;
+          const std::size_t blocks = index.blocks_of(cell.place);
           const std::size_t scanned = std::min(left, blocks);
           scan(index, begin, scanned, offer);
           done.leaves += scanned;
@@ -292,7 +292,7 @@ private:
     std::vector<std::int32_t> distances;
     for (std::size_t c = 0; c < cells.size(); ++c) {
       const std::size_t count = cells.first[c + 1] - cells.first[c];
-      const std::size_t blocks = first_block_[c + 1] - first_block_[c];
+      const std::size_t blocks = blocks_of(c);
       for (std::size_t i = 0; i < blocks * detail::block_size; ++i) {
         const std::size_t point = cells.order[cells.first[c] + std::min(i, count - 1)];
         members_.set(first_block_[c] * detail::block_size + i, &codes[point * dim]);
@@ -304,6 +304,10 @@ private:
       const auto farthest = *std::max_element(distances.begin(), distances.end());
       radii_[c] = std::sqrt(static_cast<float>(farthest)) * 1.0001F;
     }
+  }
+
+  [[nodiscard]] std::size_t blocks_of(std::size_t cell) const noexcept {
+    return first_block_[cell + 1] - first_block_[cell];
   }
 
   [[nodiscard]] float reduced_distance(const float* query, PointId id) const {
