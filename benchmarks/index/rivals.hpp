@@ -55,5 +55,6 @@ struct DescriptorRival {
 };
 std::unique_ptr<DescriptorRival> make_flann_trees(std::size_t dim, int trees);
 std::unique_ptr<DescriptorRival> make_hnswlib(std::size_t dim);
+std::unique_ptr<DescriptorRival> make_faiss_ivf(std::size_t dim);
 
 }  // namespace cairn_bench
