@@ -195,6 +195,7 @@ void score_mark(Scoreboard& board, const std::string& name, const std::vector<fl
   own.push_back(make_our_tree<Dim>());
   own.push_back(make_our_cells(Dim));
   others.push_back(make_flann_trees(Dim, 4));
+  others.push_back(make_faiss_ivf(Dim));
   constexpr std::size_t largest_graph = 200000;  // a million take it a quarter of an hour to build
   if (points <= largest_graph) others.push_back(make_hnswlib(Dim));
   const std::vector<Marked> ours = reaching(std::move(own), points / 8);

@@ -28,7 +28,7 @@ constexpr std::size_t query_count = 2000;
 
 Rivals rivals_for(const std::vector<Point3>& points) {
   Rivals rivals;
-  for (auto& rival : {make_nanoflann, make_flann_single, make_cgal, make_ann, make_pico_tree})
+  for (auto& rival : {make_nanoflann, make_flann_single, make_cgal, make_ann, make_pico_tree, make_scipy})
     if (auto made = rival(points)) rivals.push_back(std::move(made));
   return rivals;
 }
@@ -46,26 +46,39 @@ void add_ratio(Scoreboard& board, const std::string& name, const std::vector<Tim
                           aim, unit));
 }
 
+/// A question, as a contender answers it: query by query, or all of them where `all` is there.
+struct Ask {
+  std::string name;
+  std::function<double(const Point3&)> one{};
+  std::function<std::vector<double>(const std::vector<Point3>&)> all{};
+};
+
+/// Answers to every seventh query, enough to tell whether a rival is right.
+std::vector<double> some_answers(const Ask& ask, const std::vector<Point3>& queries) {
+  const auto all = ask.all ? ask.all(queries) : std::vector<double>();
+  std::vector<double> some;
+  for (std::size_t i = 0; i < queries.size(); i += 7) some.push_back(ask.all ? all[i] : ask.one(queries[i]));
+  return some;
+}
+
 /// The same question to all; a rival whose answers differ is reported and left out.
-using Ask = std::function<double(const Point3&)>;
-std::vector<Timing> time_queries(const std::vector<Point3>& queries,
-                                 const std::vector<std::pair<std::string, Ask>>& asks) {
-  std::vector<double> expected;
-  for (const Point3& query : queries) expected.push_back(asks[0].second(query));
+std::vector<Timing> time_queries(const std::vector<Point3>& queries, const std::vector<Ask>& asks) {
+  const std::vector<double> expected = some_answers(asks[0], queries);
   std::vector<Contender> contenders;
-  for (const auto& [name, ask] : asks) {
+  for (const Ask& ask : asks) {
+    const std::vector<double> answers = some_answers(ask, queries);
     std::size_t wrong = 0;
-    for (std::size_t i = 0; i < queries.size(); i += 7)
-      wrong += std::abs(ask(queries[i]) - expected[i]) > 1e-5 * (1 + std::abs(expected[i]));
+    for (std::size_t i = 0; i < answers.size(); ++i)
+      wrong += std::abs(answers[i] - expected[i]) > 1e-5 * (1 + std::abs(expected[i]));
     if (wrong > 0) {
-      std::printf("  %s: %zu answers differ, left out\n", name.c_str(), wrong);
+      std::printf("  %s: %zu answers differ, left out\n", ask.name.c_str(), wrong);
       continue;
     }
-    const Ask* call = &ask;
-    contenders.push_back({name,
-                          [call, &queries] {
+    contenders.push_back({ask.name,
+                          [&ask, &queries] {
+                            if (ask.all) return do_not_optimise(ask.all(queries));
                             double sum = 0;
-                            for (const Point3& query : queries) sum += (*call)(query);
+                            for (const Point3& query : queries) sum += ask.one(query);
                             do_not_optimise(sum);
                           },
                           static_cast<double>(queries.size())});
@@ -75,35 +88,51 @@ std::vector<Timing> time_queries(const std::vector<Point3>& queries,
 
 std::vector<Timing> time_kth(const Tree& tree, const Rivals& rivals, const std::vector<Point3>& queries,
                              std::size_t k) {
-  std::vector<std::pair<std::string, Ask>> asks;
+  std::vector<Ask> asks;
   if (k == 1)
-    asks.emplace_back("cairn",
-                      [&tree](const Point3& query) { return double{tree.nearest(query)->distance}; });
+    asks.push_back({"cairn", [&tree](const Point3& query) { return double{tree.nearest(query)->distance}; }});
   else
-    asks.emplace_back("cairn", [&tree, k](const Point3& query) {
-      std::array<cairn::Neighbor<float>, 16> found;
-      tree.nearest(query, std::span(found).first(k));
-      return double{found[k - 1].distance};
-    });
-  for (const auto& rival : rivals)
-    asks.emplace_back(rival->name,
-                      [&rival, k](const Point3& query) { return double{rival->kth_distance(query, k)}; });
+    asks.push_back({"cairn", [&tree, k](const Point3& query) {
+                      std::array<cairn::Neighbor<float>, 16> found;
+                      tree.nearest(query, std::span(found).first(k));
+                      return double{found[k - 1].distance};
+                    }});
+  for (const auto& rival : rivals) {
+    Ask& ask = asks.emplace_back();
+    ask.name = rival->name;
+    if (rival->kth_distances)
+      ask.all = [&rival, k](const std::vector<Point3>& all) {
+        const auto distances = rival->kth_distances(all, k);
+        return std::vector<double>(distances.begin(), distances.end());
+      };
+    else
+      ask.one = [&rival, k](const Point3& query) { return double{rival->kth_distance(query, k)}; };
+  }
   return time_queries(queries, asks);
 }
 
 std::vector<Timing> time_radius(const Tree& tree, const Rivals& rivals, const std::vector<Point3>& queries,
                                 float radius) {
-  std::vector<std::pair<std::string, Ask>> asks;
-  asks.emplace_back("cairn", [&tree, radius](const Point3& query) {
-    std::vector<cairn::Neighbor<float>> found;
-    cairn::Within<float> within(found, radius * radius);
-    tree.search(query, within);
-    return static_cast<double>(found.size());
-  });
-  for (const auto& rival : rivals)
-    asks.emplace_back(rival->name, [&rival, radius](const Point3& query) {
-      return static_cast<double>(rival->count_within(query, radius));
-    });
+  std::vector<Ask> asks;
+  asks.push_back({"cairn", [&tree, radius](const Point3& query) {
+                    std::vector<cairn::Neighbor<float>> found;
+                    cairn::Within<float> within(found, radius * radius);
+                    tree.search(query, within);
+                    return static_cast<double>(found.size());
+                  }});
+  for (const auto& rival : rivals) {
+    Ask& ask = asks.emplace_back();
+    ask.name = rival->name;
+    if (rival->counts_within)
+      ask.all = [&rival, radius](const std::vector<Point3>& all) {
+        const auto counts = rival->counts_within(all, radius);
+        return std::vector<double>(counts.begin(), counts.end());
+      };
+    else
+      ask.one = [&rival, radius](const Point3& query) {
+        return static_cast<double>(rival->count_within(query, radius));
+      };
+  }
   return time_queries(queries, asks);
 }
 

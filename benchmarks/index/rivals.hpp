@@ -3,7 +3,7 @@
 //
 /// @file
 /// Other libraries behind one face. Each maker returns null where the library was not found at configure
-/// time.
+/// time; scipy's also where it is gone since.
 #pragma once
 
 #include <cstddef>
@@ -22,12 +22,17 @@ struct StaticRival {
   std::function<void()> build;
   std::function<float(const Point3&, std::size_t k)> kth_distance;
   std::function<std::size_t(const Point3&, float radius)> count_within;
+  /// The same for all queries in one call, by a rival for which a call is dear; it leaves the two above
+  /// empty.
+  std::function<std::vector<float>(const std::vector<Point3>&, std::size_t k)> kth_distances{};
+  std::function<std::vector<std::size_t>(const std::vector<Point3>&, float radius)> counts_within{};
 };
 std::unique_ptr<StaticRival> make_nanoflann(const std::vector<Point3>& points);
 std::unique_ptr<StaticRival> make_flann_single(const std::vector<Point3>& points);
 std::unique_ptr<StaticRival> make_cgal(const std::vector<Point3>& points);
 std::unique_ptr<StaticRival> make_ann(const std::vector<Point3>& points);
 std::unique_ptr<StaticRival> make_pico_tree(const std::vector<Point3>& points);
+std::unique_ptr<StaticRival> make_scipy(const std::vector<Point3>& points);
 
 /// A growing index of 3-D points: nearest one.
 struct GrowingRival {
@@ -50,5 +55,6 @@ struct DescriptorRival {
 };
 std::unique_ptr<DescriptorRival> make_flann_trees(std::size_t dim, int trees);
 std::unique_ptr<DescriptorRival> make_hnswlib(std::size_t dim);
+std::unique_ptr<DescriptorRival> make_faiss_ivf(std::size_t dim);
 
 }  // namespace cairn_bench
