@@ -28,7 +28,8 @@ constexpr std::size_t query_count = 2000;
 
 Rivals rivals_for(const std::vector<Point3>& points) {
   Rivals rivals;
-  for (auto& rival : {make_nanoflann, make_flann_single, make_cgal, make_ann, make_pico_tree, make_scipy})
+  for (auto& rival :
+       {make_nanoflann, make_flann_single, make_cgal, make_ann, make_pico_tree, make_small_gicp, make_scipy})
     if (auto made = rival(points)) rivals.push_back(std::move(made));
   return rivals;
 }
@@ -121,6 +122,7 @@ std::vector<Timing> time_radius(const Tree& tree, const Rivals& rivals, const st
                     return static_cast<double>(found.size());
                   }});
   for (const auto& rival : rivals) {
+    if (!rival->count_within && !rival->counts_within) continue;  // has no such search
     Ask& ask = asks.emplace_back();
     ask.name = rival->name;
     if (rival->counts_within)

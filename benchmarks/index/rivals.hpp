@@ -32,6 +32,7 @@ std::unique_ptr<StaticRival> make_flann_single(const std::vector<Point3>& points
 std::unique_ptr<StaticRival> make_cgal(const std::vector<Point3>& points);
 std::unique_ptr<StaticRival> make_ann(const std::vector<Point3>& points);
 std::unique_ptr<StaticRival> make_pico_tree(const std::vector<Point3>& points);
+std::unique_ptr<StaticRival> make_small_gicp(const std::vector<Point3>& points);
 std::unique_ptr<StaticRival> make_scipy(const std::vector<Point3>& points);
 
 /// A growing index of 3-D points: nearest one.
@@ -41,6 +42,7 @@ struct GrowingRival {
   std::function<float(const Point3&)> nearest;
 };
 std::unique_ptr<GrowingRival> make_nanoflann_dynamic(const std::vector<Point3>& points);
+std::unique_ptr<GrowingRival> make_ikd_tree(const std::vector<Point3>& points);
 
 /// Two nearest descriptors with a budget of checks. Ids count from the first descriptor added.
 struct TwoNearest {
