@@ -171,7 +171,7 @@ TEST_SUITE("descriptor_index") {
     CHECK(200 - right < (200 - right_of_still) / 2);
   }
 
-  TEST_CASE("64 blocks keep 98 of 100 ratio-test matches of real SIFT descriptors") {
+  TEST_CASE("128 blocks keep 98 of 100 ratio-test matches of real SIFT descriptors") {
     const auto folder = cairn_test::real_data("sift_99k");
     if (!folder) return;
     const auto base = cairn_test::read_bvecs(*folder / "base.bvecs");
@@ -186,7 +186,7 @@ TEST_SUITE("descriptor_index") {
       const std::span query(queries.data() + 128 * i, 128);
       cairn::RatioTestMatch<float> exact(test, cairn::L2{}), budgeted(test, cairn::L2{});
       REQUIRE(search.search(index, query, exact));
-      search.search(index, query, budgeted, {.leaves = 64});
+      search.search(index, query, budgeted, {.leaves = 128});
       true_matches += exact.accepted();
       kept += exact.accepted() && budgeted.accepted() && budgeted.id() == exact.id();
     }

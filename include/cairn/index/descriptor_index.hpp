@@ -93,8 +93,9 @@ public:
   class Search {
   public:
     /// Offers points with their exact reduced distances, until none can be nearer than the collector's limit
-    /// or the budget is spent. Returns true where nothing was left out. Throws Error where the query is not
-    /// finite or of another dimension. `measured`, where given, counts distances of floats.
+    /// or the budget is spent, whose leaves are blocks of sixteen points. Returns true where nothing was left
+    /// out. Throws Error where the query is not finite or of another dimension. `measured`, where given,
+    /// counts distances of floats.
     template <Point Query, Collector<float> C>
     bool search(const DescriptorIndex& index, const Query& query, C& collector, Budget budget = {},
                 Work* work = nullptr, std::size_t* measured = nullptr) {
