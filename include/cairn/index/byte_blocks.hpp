@@ -139,7 +139,7 @@ struct ByteBlockRange {
 
 inline void byte_distances_plain(const ByteBlockRange& blocks, const ByteQuery& query,
                                  std::int32_t* distances) noexcept {
-  using Pairs __attribute__((vector_size(64))) = std::uint16_t;
+  using SixteenBits __attribute__((vector_size(64))) = std::uint16_t;
   using Lanes = Block<std::uint32_t>;
   const std::uint8_t* line = blocks.codes;
   for (std::size_t block = 0; block < blocks.count; ++block) {
@@ -151,8 +151,8 @@ inline void byte_distances_plain(const ByteBlockRange& blocks, const ByteQuery& 
       const Lanes even_from = Lanes{} + (from[0] | std::uint32_t{from[2]} << 16);
       const Lanes odd_from = Lanes{} + (from[1] | std::uint32_t{from[3]} << 16);
       // No difference of bytes exceeds 255: its square fits 16 bits, whatever the sign that was lost.
-      const Pairs even = Pairs(lanes & 0x00ff00ffU) - Pairs(even_from);
-      const Pairs odd = Pairs((lanes >> 8) & 0x00ff00ffU) - Pairs(odd_from);
+      const SixteenBits even = SixteenBits(lanes & 0x00ff00ffU) - SixteenBits(even_from);
+      const SixteenBits odd = SixteenBits((lanes >> 8) & 0x00ff00ffU) - SixteenBits(odd_from);
       const Lanes even_squares = Lanes(even * even);
       const Lanes odd_squares = Lanes(odd * odd);
       sums += (even_squares & 0xffffU) + (even_squares >> 16) + (odd_squares & 0xffffU) + (odd_squares >> 16);
