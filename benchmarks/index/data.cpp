@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <fstream>
 
 #include <cairn/core/random.hpp>
 
+#include "support/bvecs.hpp"
 #include "support/data.hpp"
 
 namespace cairn_bench {
@@ -31,19 +31,6 @@ void normalise(float* row, std::size_t dim) {
   double sum = 0;
   for (std::size_t a = 0; a < dim; ++a) sum += double{row[a]} * double{row[a]};
   for (std::size_t a = 0; a < dim; ++a) row[a] = static_cast<float>(row[a] / std::sqrt(sum));
-}
-
-std::vector<float> read_bvecs(const std::filesystem::path& path) {
-  std::ifstream file(path, std::ios::binary);
-  std::vector<float> rows;
-  std::vector<std::uint8_t> row;
-  std::int32_t dim = 0;
-  while (file.read(reinterpret_cast<char*>(&dim), 4)) {
-    row.resize(static_cast<std::size_t>(dim));
-    file.read(reinterpret_cast<char*>(row.data()), dim);
-    rows.insert(rows.end(), row.begin(), row.end());
-  }
-  return rows;
 }
 
 }  // namespace
@@ -102,7 +89,8 @@ std::vector<float> noisy_copies(const std::vector<float>& of, std::size_t count,
 std::optional<Descriptors> sift() {
   const auto folder = cairn_test::real_data("sift_99k");
   if (!folder) return std::nullopt;
-  return Descriptors{128, read_bvecs(*folder / "base.bvecs"), read_bvecs(*folder / "query.bvecs")};
+  return Descriptors{128, cairn_test::read_bvecs(*folder / "base.bvecs"),
+                     cairn_test::read_bvecs(*folder / "query.bvecs")};
 }
 
 }  // namespace cairn_bench

@@ -64,11 +64,7 @@ std::unique_ptr<DescriptorRival> make_faiss_ivf(std::size_t dim) {
         lists->index->nprobe = static_cast<std::size_t>(probes);
         lists->index->search(static_cast<faiss::Index::idx_t>(count), queries.data(), 2, squares.data(),
                              ids.data());
-        std::vector<TwoNearest> found(count);
-        for (std::size_t i = 0; i < count; ++i)
-          found[i] = {static_cast<std::size_t>(ids[2 * i]), std::sqrt(squares[2 * i]),
-                      std::sqrt(squares[2 * i + 1])};
-        return found;
+        return two_nearest_of(ids, squares);
       }});
 }
 #else

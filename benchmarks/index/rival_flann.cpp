@@ -70,11 +70,7 @@ std::unique_ptr<DescriptorRival> make_flann_trees(std::size_t dim, int trees) {
                         Floats square_matrix(squares.data(), count, 2);
                         (*index)->knnSearch(matrix(queries.data(), count, dim), id_matrix, square_matrix, 2,
                                             flann::SearchParams(checks));
-                        std::vector<TwoNearest> found(count);
-                        for (std::size_t i = 0; i < count; ++i)
-                          found[i] = {static_cast<std::size_t>(ids[2 * i]), std::sqrt(squares[2 * i]),
-                                      std::sqrt(squares[2 * i + 1])};
-                        return found;
+                        return two_nearest_of(ids, squares);
                       }});
 }
 #else

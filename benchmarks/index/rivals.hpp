@@ -6,6 +6,7 @@
 /// time; scipy's also where it is gone since.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <functional>
 #include <memory>
@@ -50,6 +51,16 @@ struct TwoNearest {
   float first;
   float second;
 };
+/// From two ids and two squared distances a query, one query after the other.
+template <class Id>
+std::vector<TwoNearest> two_nearest_of(const std::vector<Id>& ids, const std::vector<float>& squares) {
+  std::vector<TwoNearest> found(ids.size() / 2);
+  for (std::size_t i = 0; i < found.size(); ++i)
+    found[i] = {static_cast<std::size_t>(ids[2 * i]), std::sqrt(squares[2 * i]),
+                std::sqrt(squares[2 * i + 1])};
+  return found;
+}
+
 struct DescriptorRival {
   std::string name;
   std::function<void(const float* rows, std::size_t count)> add;

@@ -14,8 +14,8 @@
 #include <cairn/index/descriptor_index.hpp>
 #include <cairn/index/ratio_test.hpp>
 
-#include "index/bvecs.hpp"
 #include "index/generators.hpp"
+#include "support/bvecs.hpp"
 #include "support/data.hpp"
 #include "support/folder.hpp"
 #include "support/random.hpp"

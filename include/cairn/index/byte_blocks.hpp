@@ -169,6 +169,15 @@ public:
   ByteBlocks(std::size_t dim, std::size_t blocks)
       : dim_(dim), codes_(blocks * groups() * 64), constants_(blocks * block_size) {}
 
+  /// Of `count` points, at least one, row_of(i) being the bytes of point i; the last block repeats the last.
+  template <class RowOf>
+  [[nodiscard]] static ByteBlocks of_rows(std::size_t dim, std::size_t count, const RowOf& row_of) {
+    ByteBlocks result(dim, (count + block_size - 1) / block_size);
+    for (std::size_t place = 0; place < result.blocks() * block_size; ++place)
+      result.set(place, row_of(std::min(place, count - 1)));
+    return result;
+  }
+
   [[nodiscard]] std::size_t blocks() const noexcept { return constants_.size() / block_size; }
   [[nodiscard]] std::size_t bytes() const noexcept {
     return codes_.capacity() + constants_.capacity() * sizeof(std::int32_t);

@@ -279,9 +279,8 @@ private:
 
   void fill(const std::vector<std::uint8_t>& codes, const detail::MeanCells& cells) {
     const std::size_t dim = dimension();
-    means_ = detail::ByteBlocks(dim, (cells.size() + detail::block_size - 1) / detail::block_size);
-    for (std::size_t place = 0; place < means_.blocks() * detail::block_size; ++place)
-      means_.set(place, &cells.means[std::min(place, cells.size() - 1) * dim]);
+    const auto mean_of = [&](std::size_t cell) { return &cells.means[cell * dim]; };
+    means_ = detail::ByteBlocks::of_rows(dim, cells.size(), mean_of);
     first_block_.assign(cells.size() + 1, 0);
     for (std::size_t c = 0; c < cells.size(); ++c)
       first_block_[c + 1] = first_block_[c] + (cells.first[c + 1] - cells.first[c] + detail::block_size - 1) /

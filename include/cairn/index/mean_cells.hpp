@@ -103,9 +103,8 @@ private:
 
   /// For each point the cell whose mean is nearest, of those near its own; of equals its own.
   [[nodiscard]] std::vector<std::uint32_t> nearest_cells() const {
-    ByteBlocks means(dim_, (cells_.size() + block_size - 1) / block_size);
-    for (std::size_t place = 0; place < means.blocks() * block_size; ++place)
-      means.set(place, &cells_.means[std::min(place, cells_.size() - 1) * dim_]);
+    const auto mean_of = [this](std::size_t cell) { return &cells_.means[cell * dim_]; };
+    const ByteBlocks means = ByteBlocks::of_rows(dim_, cells_.size(), mean_of);
     std::vector<std::uint32_t> result(count());
     parallel_for(cells_.size(), threads_, [&](std::size_t begin, std::size_t end) {
       ByteQuery query;
@@ -125,11 +124,9 @@ private:
   void assign(std::size_t cell, SmallestFirst& nearest, std::vector<std::uint32_t>& result) const {
     const std::size_t candidates = std::min(neighbours, cells_.size());
     std::uint32_t number[neighbours];
-    ByteBlocks means(dim_, (candidates + block_size - 1) / block_size);
-    for (std::size_t place = 0; place < means.blocks() * block_size; ++place) {
-      if (place < candidates) number[place] = static_cast<std::uint32_t>(nearest.next().place);
-      means.set(place, &cells_.means[number[std::min(place, candidates - 1)] * dim_]);
-    }
+    for (std::size_t i = 0; i < candidates; ++i) number[i] = static_cast<std::uint32_t>(nearest.next().place);
+    const auto mean_of = [&](std::size_t i) { return &cells_.means[number[i] * dim_]; };
+    const ByteBlocks means = ByteBlocks::of_rows(dim_, candidates, mean_of);
     ByteQuery query;
     std::int32_t distances[neighbours];
     for (const std::uint32_t point : members(cell)) {
