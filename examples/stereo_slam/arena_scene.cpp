@@ -16,7 +16,7 @@
 namespace stereo_slam {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 int texels(double metres) {
   return static_cast<int>(std::lround(metres * ArenaScene::texels_per_metre));

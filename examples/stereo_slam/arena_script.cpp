@@ -12,7 +12,7 @@
 namespace stereo_slam {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using std::numbers::pi;
 
 std::vector<Stance> turn() {
   constexpr int frames = 181;  // 2 degrees a frame; the last stands exactly like the first

@@ -19,12 +19,7 @@ namespace {
 using Path = std::filesystem::path;
 using Projection = std::vector<double>;  // 3 x 4, row by row
 
-constexpr double frames_a_second = 10;  // of KITTI, where there is no times.txt
-
-bool is_file(const Path& path) {
-  std::error_code failure;
-  return std::filesystem::is_regular_file(path, failure);
-}
+constexpr double frames_a_second_of_kitti = 10;  // where there is no times.txt
 
 // P of the left and the right camera: rows P0: and P1:, or the first two rows of 12 numbers without names.
 std::array<Projection, 2> read_projections(const Path& file) {
@@ -68,7 +63,7 @@ cairn::StereoRig rectified_rig(const Path& file) {
 std::vector<double> read_times(const Path& file, std::size_t frames) {
   std::vector<double> times(frames);
   if (!is_file(file)) {
-    for (std::size_t i = 0; i < frames; ++i) times[i] = static_cast<double>(i) / frames_a_second;
+    for (std::size_t i = 0; i < frames; ++i) times[i] = static_cast<double>(i) / frames_a_second_of_kitti;
     return times;
   }
   cairn::TextLines lines(file, "the times of a KITTI sequence");

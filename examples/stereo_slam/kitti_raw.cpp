@@ -19,11 +19,6 @@ namespace {
 
 using Path = std::filesystem::path;
 
-bool is_file(const Path& path) {
-  std::error_code failure;
-  return std::filesystem::is_regular_file(path, failure);
-}
-
 Path calibration_file(const Path& folder) {
   constexpr const char* name = "calib_cam_to_cam.txt";
   std::error_code failure;

@@ -121,10 +121,9 @@ void print_summary(const stereo_slam::RunRecord& record) {
               record.dataset.c_str(), summary.frames, summary.frames_lost, summary.seconds, summary.hz,
               summary.landmarks);
   if (!summary.errors) return;
-  constexpr double degrees = 57.29577951308232;
   std::printf("path %.2f m, error at the end %.3f m, largest %.3f m and %.2f degrees\n", summary.path,
               summary.errors->end, summary.errors->largest.position,
-              summary.errors->largest.heading * degrees);
+              summary.errors->largest.heading * stereo_slam::degrees);
   std::fflush(stdout);
 }
 

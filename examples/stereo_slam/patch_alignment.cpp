@@ -12,9 +12,9 @@
 namespace stereo_slam {
 namespace {
 
-constexpr int half = 5;
-constexpr int side = 2 * half + 1;
-constexpr int count = side * side;
+constexpr int patch_half = 5;
+constexpr int patch_side = 2 * patch_half + 1;
+constexpr int patch_pixels = patch_side * patch_side;
 constexpr int most_steps = 12;
 constexpr float farthest = 2.0F;  // [pixels] from the start: beyond it the match itself was wrong
 constexpr float settled = 0.01F;  // [pixels]
@@ -43,8 +43,8 @@ bool inside(cairn::ImageView image, float x, float y, float margin) {
 
 /// Subtracts the mean; returns the root of the sum of squares that is left.
 float centre(Patch& patch) {
-  const float mean = patch.sum() / count;
-  patch.head<count>() -= mean;
+  const float mean = patch.sum() / patch_pixels;
+  patch.head<patch_pixels>() -= mean;
   return std::sqrt(patch.square().sum());
 }
 
@@ -58,26 +58,26 @@ struct Template {
 
 /// Fills grey levels and slopes (central differences) of the patch around (x, y).
 void sample_template(cairn::ImageView image, float x, float y, Template& result) {
-  constexpr int wide = side + 2;
+  constexpr int wide = patch_side + 2;
   std::array<float, wide * wide> grey{};
   for (int v = 0, i = 0; v < wide; ++v)
     for (int u = 0; u < wide; ++u, ++i)
-      grey[static_cast<std::size_t>(i)] =
-          sample(image, x + static_cast<float>(u - half - 1), y + static_cast<float>(v - half - 1));
-  for (int v = 0, i = 0; v < side; ++v)
-    for (int u = 0; u < side; ++u, ++i) {
+      grey[static_cast<std::size_t>(i)] = sample(image, x + static_cast<float>(u - patch_half - 1),
+                                                 y + static_cast<float>(v - patch_half - 1));
+  for (int v = 0, i = 0; v < patch_side; ++v)
+    for (int u = 0; u < patch_side; ++u, ++i) {
       const float* at = grey.data() + (v + 1) * wide + u + 1;
       result.grey(i) = *at;
       const float slope_x = 0.5F * (at[1] - at[-1]);
       result.slopes[0](i) = slope_x;
       result.slopes[1](i) = 0.5F * (at[wide] - at[-wide]);
-      result.slopes[2](i) = slope_x * static_cast<float>(u - half) / half;
-      result.slopes[3](i) = slope_x * static_cast<float>(v - half) / half;
+      result.slopes[2](i) = slope_x * static_cast<float>(u - patch_half) / patch_half;
+      result.slopes[3](i) = slope_x * static_cast<float>(v - patch_half) / patch_half;
     }
 }
 
 std::optional<Template> make_template(cairn::ImageView image, float x, float y) {
-  if (!inside(image, x, y, half + 1)) return std::nullopt;
+  if (!inside(image, x, y, patch_half + 1)) return std::nullopt;
   Template result;
   sample_template(image, x, y, result);
   result.norm = centre(result.grey);
@@ -88,7 +88,7 @@ std::optional<Template> make_template(cairn::ImageView image, float x, float y) 
       normal(r, c) = normal(c, r) =
           (result.slopes[static_cast<std::size_t>(r)] * result.slopes[static_cast<std::size_t>(c)]).sum();
   constexpr float weakest_gradient = 2.0F;  // [grey levels a pixel] rms: below it noise decides
-  if (!(normal(0, 0) >= weakest_gradient * weakest_gradient * count)) return std::nullopt;
+  if (!(normal(0, 0) >= weakest_gradient * weakest_gradient * patch_pixels)) return std::nullopt;
   // A little of the largest entry keeps the shears from running away on patches that cannot see them.
   normal.diagonal().array() += 1e-4F * normal.diagonal().maxCoeff();
   result.normal_equations.compute(normal);
@@ -98,15 +98,15 @@ std::optional<Template> make_template(cairn::ImageView image, float x, float y) 
 /// The right patch under the warp, centred and scaled to the template's contrast, minus the template.
 bool residual(const Template& reference, cairn::ImageView right, float x, float y,
               const cairn::Vector<4, float>& warp, Patch& difference) {
-  constexpr float margin = half + 2 * farthest;
+  constexpr float margin = patch_half + 2 * farthest;
   if (!inside(right, x + warp(0), y + warp(1), margin) || std::abs(warp(2)) > farthest ||
       std::abs(warp(3)) > farthest)
     return false;
-  for (int v = -half, i = 0; v <= half; ++v) {
+  for (int v = -patch_half, i = 0; v <= patch_half; ++v) {
     const auto fv = static_cast<float>(v);
-    const float row_x = x + warp(0) + warp(3) * fv / half;
-    const float step = 1 + warp(2) / half;
-    for (int u = -half; u <= half; ++u, ++i)
+    const float row_x = x + warp(0) + warp(3) * fv / patch_half;
+    const float step = 1 + warp(2) / patch_half;
+    for (int u = -patch_half; u <= patch_half; ++u, ++i)
       difference(i) = sample(right, row_x + step * static_cast<float>(u), y + fv + warp(1));
   }
   const float norm = centre(difference);
@@ -139,7 +139,7 @@ std::optional<PatchAlignment> align_patch(cairn::ImageView left, float left_x, f
     PatchAlignment result;
     result.x = right_x + warp(0);
     result.y = right_y + warp(1);
-    result.sigma = std::sqrt(squares / (count - 6) * column(0));
+    result.sigma = std::sqrt(squares / (patch_pixels - 6) * column(0));
     result.correlation = 1 - 0.5F * squares / (reference->norm * reference->norm);
     return result;
   }

@@ -109,6 +109,11 @@ void require_folder(const std::filesystem::path& folder, const std::string& expe
                expected);
 }
 
+bool is_file(const std::filesystem::path& path) {
+  std::error_code failure;
+  return std::filesystem::is_regular_file(path, failure);
+}
+
 std::vector<std::filesystem::path> image_files(const std::filesystem::path& folder,
                                                const std::string& expected) {
   require_folder(folder, expected);

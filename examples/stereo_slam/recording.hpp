@@ -55,6 +55,9 @@ struct Recording {
 [[nodiscard]] std::vector<std::filesystem::path> image_files(const std::filesystem::path& folder,
                                                              const std::string& expected);
 
+/// Whether there is such a regular file; false where that cannot be told.
+[[nodiscard]] bool is_file(const std::filesystem::path& path);
+
 /// Throws unless `folder` is one; `expected` says what should be in it.
 void require_folder(const std::filesystem::path& folder, const std::string& expected);
 

@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
@@ -19,7 +18,6 @@ namespace {
 
 using example::Ink;
 
-constexpr double degrees = 180.0 / std::numbers::pi;
 constexpr double gap = std::numeric_limits<double>::quiet_NaN();
 
 /// One value a frame.

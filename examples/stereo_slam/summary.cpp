@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <span>
 
 #include <nlohmann/json.hpp>
@@ -16,8 +15,6 @@
 
 namespace stereo_slam {
 namespace {
-
-constexpr double degrees = 180.0 / std::numbers::pi;
 
 double median_over_frames(const RunRecord& run, int FrameRecord::* count) {
   std::vector<double> values;

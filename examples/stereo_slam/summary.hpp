@@ -23,6 +23,8 @@
 
 namespace stereo_slam {
 
+inline constexpr double degrees = 180.0 / std::numbers::pi;  ///< in a radian
+
 /// Middle and 95th percentile of a stage's time over the frames [ms].
 struct StageTime {
   double median = 0;

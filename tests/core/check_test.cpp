@@ -7,6 +7,7 @@
 
 #include <cairn/core/check.hpp>
 
+namespace check_test {
 namespace {
 
 void throwing_handler(const cairn::Violation& violation) {
@@ -38,3 +39,5 @@ TEST_SUITE("check") {
     CHECK_THROWS_WITH_AS(cairn::raise("the file 'x' is empty"), "the file 'x' is empty", cairn::Error);
   }
 }
+
+}  // namespace check_test

@@ -16,6 +16,7 @@ using cairn::Cholesky;
 using cairn::Matrix;
 using cairn::Vector;
 
+namespace cholesky_test {
 namespace {
 
 template <int R, int C, class S>
@@ -112,3 +113,5 @@ TEST_SUITE("Cholesky") {
     CHECK(sum.isApprox(expected, 1e-13));
   }
 }
+
+}  // namespace cholesky_test

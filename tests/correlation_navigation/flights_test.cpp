@@ -25,6 +25,7 @@
 
 using namespace correlation_navigation;
 
+namespace flights_test {
 namespace {
 
 cairn::FieldGrid ground(std::uint64_t seed, int columns = 420, int rows = 400) {
@@ -183,3 +184,5 @@ TEST_SUITE("correlation_navigation") {
           }).find("cannot make this folder") != std::string::npos);
   }
 }
+
+}  // namespace flights_test

@@ -21,6 +21,7 @@ using cairn_test::Folder;
 using cairn_test::message_of;
 using correlation_navigation::read_terrain;
 
+namespace terrain_file_test {
 namespace {
 
 template <class Number>
@@ -161,3 +162,5 @@ TEST_SUITE("terrain_file") {
     CHECK(highest == 2295.0);
   }
 }
+
+}  // namespace terrain_file_test

@@ -17,6 +17,7 @@ using cairn::Consistency;
 using cairn::Matrix;
 using cairn::Vector;
 
+namespace consistency_test {
 namespace {
 
 // A covariance with correlations, its factor, and draws from it scaled by `factor`.
@@ -100,3 +101,5 @@ TEST_SUITE("consistency") {
     cairn::set_violation_handler(previous);
   }
 }
+
+}  // namespace consistency_test

@@ -18,6 +18,7 @@ using cairn::SE3;
 using cairn::SO3;
 using cairn::Vector;
 
+namespace kitti_metric_test {
 namespace {
 
 // A straight drive of one metre a frame, seen by an odometry that is `stretch` too long and turns by `turn`
@@ -116,3 +117,5 @@ TEST_SUITE("kitti_metric") {
     }
   }
 }
+
+}  // namespace kitti_metric_test

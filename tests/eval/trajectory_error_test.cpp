@@ -21,6 +21,7 @@ using cairn::SO3;
 using cairn::Trajectory;
 using cairn::Vector;
 
+namespace trajectory_error_test {
 namespace {
 
 SE3 random_pose(cairn::Random& random, double metres) {
@@ -192,3 +193,5 @@ TEST_SUITE("trajectory_error") {
     CHECK(ate(v102, AlignBy::similarity) < ate(v102, AlignBy::rigid));
   }
 }
+
+}  // namespace trajectory_error_test

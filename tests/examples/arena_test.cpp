@@ -22,6 +22,7 @@
 #include "arena_script.hpp"
 #include "support/folder.hpp"
 
+namespace arena_test {
 namespace {
 
 using stereo_slam::ArenaOptions;
@@ -466,3 +467,5 @@ TEST_SUITE("arena") {
     CHECK(message([](ArenaOptions&) {}).empty());
   }
 }
+
+}  // namespace arena_test

@@ -23,6 +23,7 @@
 #include "support/folder.hpp"
 #include "support/image_io.hpp"
 
+namespace dataset_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -497,3 +498,5 @@ TEST_SUITE("dataset") {
     CHECK(step.translation()(2) == doctest::Approx(step.translation().norm()).epsilon(0.03));
   }
 }
+
+}  // namespace dataset_test

@@ -14,6 +14,7 @@
 #include "support/folder.hpp"
 #include "vision/pictures.hpp"
 
+namespace feature_choice_test {
 namespace {
 
 using stereo_slam::FeatureKind;
@@ -106,3 +107,5 @@ TEST_SUITE("feature_choice") {
     CHECK(stereo_slam::make_landmark_store({.dimension = 64}) != nullptr);
   }
 }
+
+}  // namespace feature_choice_test

@@ -18,6 +18,7 @@
 #include "support/folder.hpp"
 #include "support/random.hpp"
 
+namespace image_io_test {
 namespace {
 
 cairn::Image random_image(int width, int height, cairn::Random& random) {
@@ -149,3 +150,5 @@ TEST_SUITE("image_io") {
     CHECK(refused > static_cast<int>(bytes.size()) * 9 / 10);
   }
 }
+
+}  // namespace image_io_test

@@ -23,6 +23,7 @@ namespace fs = std::filesystem;
 using cairn_test::Folder;
 using cairn_test::message_of;
 
+namespace outputs_test {
 namespace {
 
 std::set<std::string> names_in(const fs::path& folder) {
@@ -153,3 +154,5 @@ TEST_CASE("outputs: when one file is in the way of a folder none is written") {
 }
 
 TEST_SUITE_END();
+
+}  // namespace outputs_test

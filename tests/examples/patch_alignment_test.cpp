@@ -8,6 +8,7 @@
 
 #include <doctest/doctest.h>
 
+namespace patch_alignment_test {
 namespace {
 
 constexpr int width = 64, height = 48;
@@ -64,3 +65,5 @@ TEST_SUITE("patch_alignment") {
     CHECK_FALSE(stereo_slam::align_patch(cairn::Image(3, 3), 1, 1, cairn::Image(3, 3), 1, 1));
   }
 }
+
+}  // namespace patch_alignment_test

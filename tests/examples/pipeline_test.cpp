@@ -14,6 +14,7 @@
 #include "support/data.hpp"
 #include "support/folder.hpp"
 
+namespace pipeline_test {
 namespace {
 
 using stereo_slam::FrameRecord;
@@ -162,3 +163,5 @@ TEST_SUITE("pipeline") {
     }
   }
 }
+
+}  // namespace pipeline_test

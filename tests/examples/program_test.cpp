@@ -13,6 +13,7 @@
 
 #include "support/folder.hpp"
 
+namespace program_test {
 namespace {
 
 namespace fs = std::filesystem;
@@ -100,3 +101,5 @@ TEST_SUITE("program") {
     CHECK(bytes("out1") == bytes("out2"));
   }
 }
+
+}  // namespace program_test

@@ -8,6 +8,7 @@
 
 #include <doctest/doctest.h>
 
+namespace progress_test {
 namespace {
 
 std::string after(std::size_t total, std::size_t steps, bool terminal) {
@@ -60,3 +61,5 @@ TEST_CASE("progress: no total and too many steps do no harm") {
 }
 
 TEST_SUITE_END();
+
+}  // namespace progress_test

@@ -16,6 +16,7 @@
 #include "support/folder.hpp"
 #include "support/report.hpp"
 
+namespace report_page_test {
 namespace {
 
 struct Opened {
@@ -110,3 +111,5 @@ TEST_CASE("report page: 4000 frames and 20000 landmarks open") {
 }
 
 TEST_SUITE_END();
+
+}  // namespace report_page_test

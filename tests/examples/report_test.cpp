@@ -16,6 +16,7 @@ using cairn_test::message_of;
 using example::Ink;
 using example::Report;
 
+namespace report_test {
 namespace {
 
 constexpr double not_a_number = std::numeric_limits<double>::quiet_NaN();
@@ -158,3 +159,5 @@ TEST_CASE("report: readable numbers are short") {
 }
 
 TEST_SUITE_END();
+
+}  // namespace report_test

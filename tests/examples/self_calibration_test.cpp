@@ -12,6 +12,7 @@
 #include "support/random.hpp"
 #include "support/rigs.hpp"
 
+namespace self_calibration_test {
 namespace {
 
 using cairn::SE3;
@@ -77,3 +78,5 @@ TEST_SUITE("self_calibration") {
           1e-15);
   }
 }
+
+}  // namespace self_calibration_test

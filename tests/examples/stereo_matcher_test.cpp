@@ -12,6 +12,7 @@
 #include "support/folder.hpp"
 #include "support/random.hpp"
 
+namespace stereo_matcher_test {
 namespace {
 
 cairn::PinholeCamera camera(double k1) {
@@ -135,3 +136,5 @@ TEST_SUITE("stereo_matcher") {
     CHECK_THROWS_AS(stereo_slam::StereoMatcher(behind, {}), cairn::Error);
   }
 }
+
+}  // namespace stereo_matcher_test

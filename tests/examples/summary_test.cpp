@@ -21,6 +21,7 @@ using stereo_slam::RunRecord;
 using stereo_slam::summarise;
 using stereo_slam::Summary;
 
+namespace summary_test {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
@@ -168,3 +169,5 @@ TEST_CASE("summary: a run without frames is refused") {
 }
 
 TEST_SUITE_END();
+
+}  // namespace summary_test

@@ -25,6 +25,7 @@ using cairn::PatchSamples;
 using cairn::PatchShape;
 using cairn::Plane;
 
+namespace correlation_test {
 namespace {
 
 Plane noise_plane(int columns, int rows, cairn::Random& random) {
@@ -253,3 +254,5 @@ TEST_SUITE("correlation") {
     CHECK(verdict(periodic, frame(periodic, shape, guess, 0.1, random), guess) == FixVerdict::ambiguous);
   }
 }
+
+}  // namespace correlation_test

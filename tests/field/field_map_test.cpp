@@ -20,6 +20,7 @@ using cairn::FieldGrid;
 using cairn::GridFrame;
 using cairn_test::message_of;
 
+namespace field_map_test {
 namespace {
 
 const GridFrame frame{-3.0, 7.0, 0.5, 2.0};
@@ -161,3 +162,5 @@ TEST_SUITE("field_map") {
           std::string::npos);
   }
 }
+
+}  // namespace field_map_test

@@ -17,6 +17,7 @@
 #include "filter/linear_problems.hpp"
 #include "support/random.hpp"
 
+namespace agreement_test {
 namespace {
 
 using cairn::Form;
@@ -141,3 +142,4 @@ TEST_SUITE("agreement") {
 }
 
 }  // namespace
+}  // namespace agreement_test

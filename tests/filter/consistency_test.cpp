@@ -15,6 +15,7 @@
 #include "filter/consistency_study.hpp"
 #include "support/random.hpp"
 
+namespace consistency_test {
 namespace {
 
 constexpr int runs = 500;
@@ -67,3 +68,4 @@ TEST_SUITE("consistency") {
 }
 
 }  // namespace
+}  // namespace consistency_test

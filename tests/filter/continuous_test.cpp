@@ -11,6 +11,7 @@
 #include <cairn/models/motion.hpp>
 #include <cairn/models/sensor.hpp>
 
+namespace continuous_test {
 namespace {
 
 using cairn::Gaussian;
@@ -157,3 +158,4 @@ TEST_SUITE("information") {
 }
 
 }  // namespace
+}  // namespace continuous_test

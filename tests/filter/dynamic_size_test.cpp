@@ -11,6 +11,7 @@
 #include "filter/linear_problems.hpp"
 #include "support/random.hpp"
 
+namespace dynamic_size_test {
 namespace {
 
 using cairn::Form;
@@ -75,3 +76,4 @@ TEST_SUITE("dynamic sizes") {
 }
 
 }  // namespace
+}  // namespace dynamic_size_test

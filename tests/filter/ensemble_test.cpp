@@ -16,6 +16,7 @@
 #include "filter/linear_problems.hpp"
 #include "support/random.hpp"
 
+namespace ensemble_test {
 namespace {
 
 using cairn::Ensemble;
@@ -169,3 +170,4 @@ TEST_SUITE("particle") {
 }
 
 }  // namespace
+}  // namespace ensemble_test

@@ -16,6 +16,7 @@
 #include <cairn/filter/unscented.hpp>
 #include <cairn/models/linear.hpp>
 
+namespace ill_conditioned_test {
 namespace {
 
 using cairn::Form;
@@ -153,3 +154,4 @@ TEST_SUITE("ill conditioned") {
 }
 
 }  // namespace
+}  // namespace ill_conditioned_test

@@ -11,6 +11,7 @@
 
 #include "support/random.hpp"
 
+namespace kalman_test {
 namespace {
 
 using cairn::Gaussian;
@@ -62,3 +63,4 @@ TEST_SUITE("kalman") {
 }
 
 }  // namespace
+}  // namespace kalman_test

@@ -22,6 +22,7 @@
 
 #include "support/data.hpp"
 
+namespace mrclam_test {
 namespace {
 
 using cairn::Gaussian;
@@ -154,3 +155,4 @@ TEST_SUITE("mrclam") {
 }
 
 }  // namespace
+}  // namespace mrclam_test

@@ -20,6 +20,7 @@
 #include "support/mat_file.hpp"
 #endif
 
+namespace noise_fit_test {
 namespace {
 
 using cairn::Gaussian;
@@ -149,3 +150,4 @@ TEST_SUITE("noise_fit") {
 }
 
 }  // namespace
+}  // namespace noise_fit_test

@@ -25,6 +25,7 @@
 
 #include "support/data.hpp"
 
+namespace published_data_test {
 namespace {
 
 using cairn::Gaussian;
@@ -256,3 +257,4 @@ TEST_SUITE("published data") {
 }
 
 }  // namespace
+}  // namespace published_data_test

@@ -19,6 +19,7 @@
 
 #include "support/random.hpp"
 
+namespace random_steps_test {
 namespace {
 
 constexpr int d = cairn::dynamic;
@@ -118,3 +119,4 @@ TEST_SUITE("random steps") {
 }
 
 }  // namespace
+}  // namespace random_steps_test

@@ -13,6 +13,7 @@
 #include "filter/linear_problems.hpp"
 #include "support/random.hpp"
 
+namespace robust_test {
 namespace {
 
 using cairn::Gaussian;
@@ -153,3 +154,4 @@ TEST_SUITE("robust") {
 }
 
 }  // namespace
+}  // namespace robust_test

@@ -20,6 +20,7 @@
 #include "filter/linear_problems.hpp"
 #include "support/random.hpp"
 
+namespace sampling_test {
 namespace {
 
 using cairn::Gaussian;
@@ -234,3 +235,4 @@ TEST_SUITE("interacting") {
 }
 
 }  // namespace
+}  // namespace sampling_test

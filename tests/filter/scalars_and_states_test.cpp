@@ -55,6 +55,7 @@ struct cairn::manifold_traits<cairn_test::Pendulum<S>> {
   }
 };
 
+namespace scalars_and_states_test {
 namespace {
 
 using cairn::Gaussian;
@@ -230,3 +231,4 @@ TEST_SUITE("scalars") {
 }
 
 }  // namespace
+}  // namespace scalars_and_states_test

@@ -17,6 +17,7 @@
 #include "filter/nile.hpp"
 #include "support/random.hpp"
 
+namespace smoother_test {
 namespace {
 
 using cairn::Gaussian;
@@ -186,3 +187,4 @@ TEST_SUITE("steady_state") {
 }
 
 }  // namespace
+}  // namespace smoother_test

@@ -21,6 +21,7 @@
 #include "support/data.hpp"
 #include "support/mat_file.hpp"
 
+namespace starry_night_test {
 namespace {
 
 using cairn::Gaussian;
@@ -173,3 +174,5 @@ TEST_SUITE("starry night") {
 
 }  // namespace
 #endif
+
+}  // namespace starry_night_test

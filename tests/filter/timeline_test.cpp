@@ -16,6 +16,7 @@
 
 #include "support/random.hpp"
 
+namespace timeline_test {
 namespace {
 
 using cairn::Compass;
@@ -152,3 +153,4 @@ TEST_SUITE("timeline") {
 }
 
 }  // namespace
+}  // namespace timeline_test

@@ -15,6 +15,7 @@
 #include "filter/linear_problems.hpp"
 #include "support/random.hpp"
 
+namespace unscented_test {
 namespace {
 
 using cairn::Gaussian;
@@ -177,3 +178,4 @@ TEST_SUITE("unscented") {
 }
 
 }  // namespace
+}  // namespace unscented_test

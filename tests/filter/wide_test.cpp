@@ -12,6 +12,7 @@
 
 #include "filter/linear_problems.hpp"
 
+namespace wide_test {
 namespace {
 
 using cairn::Gaussian;
@@ -94,3 +95,4 @@ TEST_SUITE("wide") {
 }
 
 }  // namespace
+}  // namespace wide_test

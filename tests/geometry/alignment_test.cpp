@@ -16,6 +16,7 @@
 #include "support/random.hpp"
 #include "support/rigs.hpp"
 
+namespace alignment_test {
 namespace {
 
 using cairn::align_points;
@@ -216,3 +217,5 @@ TEST_SUITE("alignment") {
     CHECK(message(bad, good, {}).find("overflow") != std::string::npos);
   }
 }
+
+}  // namespace alignment_test

@@ -15,6 +15,7 @@
 #include "support/random.hpp"
 #include "support/rigs.hpp"
 
+namespace calibration_drift_test {
 namespace {
 
 using cairn::CalibrationDrift;
@@ -149,3 +150,5 @@ TEST_SUITE("calibration_drift") {
     CHECK(drift.covariance().allFinite());
   }
 }
+
+}  // namespace calibration_drift_test

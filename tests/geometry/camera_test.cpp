@@ -11,6 +11,7 @@
 
 #include "support/random.hpp"
 
+namespace camera_test {
 namespace {
 
 using cairn::PinholeCamera;
@@ -135,3 +136,5 @@ TEST_SUITE("camera") {
     CHECK(PinholeCamera().contains(Vector<2>(1e6, -1e6)));
   }
 }
+
+}  // namespace camera_test

@@ -15,6 +15,7 @@
 #include "support/random.hpp"
 #include "support/rigs.hpp"
 
+namespace motion_calibration_test {
 namespace {
 
 using cairn::Matrix;
@@ -185,3 +186,5 @@ TEST_SUITE("motion_calibration") {
     CHECK(off.state().norm() == 0.0);
   }
 }
+
+}  // namespace motion_calibration_test

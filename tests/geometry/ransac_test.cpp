@@ -15,6 +15,7 @@
 
 #include "support/random.hpp"
 
+namespace ransac_test {
 namespace {
 
 using cairn::RansacOptions;
@@ -201,3 +202,5 @@ TEST_SUITE("ransac") {
     CHECK(with.score.inliers >= 20);
   }
 }
+
+}  // namespace ransac_test

@@ -13,6 +13,7 @@
 #include "support/random.hpp"
 #include "support/rigs.hpp"
 
+namespace robust_alignment_test {
 namespace {
 
 using cairn::align_robustly;
@@ -137,3 +138,5 @@ TEST_SUITE("robust_alignment") {
     CHECK(message.find("pair 42") != std::string::npos);
   }
 }
+
+}  // namespace robust_alignment_test

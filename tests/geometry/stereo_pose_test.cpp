@@ -17,6 +17,7 @@
 #include "support/random.hpp"
 #include "support/rigs.hpp"
 
+namespace stereo_pose_test {
 namespace {
 
 using cairn::estimate_stereo_pose;
@@ -424,3 +425,5 @@ TEST_SUITE("stereo_pose") {
     }
   }
 }
+
+}  // namespace stereo_pose_test

@@ -13,6 +13,7 @@
 #include "support/random.hpp"
 #include "support/rigs.hpp"
 
+namespace triangulation_test {
 namespace {
 
 using cairn::Triangulation;
@@ -143,3 +144,5 @@ TEST_SUITE("triangulation") {
       }
   }
 }
+
+}  // namespace triangulation_test

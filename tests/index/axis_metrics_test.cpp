@@ -21,6 +21,7 @@
 #include "support/folder.hpp"
 #include "support/random.hpp"
 
+namespace axis_metrics_test {
 namespace {
 
 using cairn::straight;
@@ -239,3 +240,5 @@ TEST_SUITE("axis_metrics") {
     CHECK(forest.empty());
   }
 }
+
+}  // namespace axis_metrics_test

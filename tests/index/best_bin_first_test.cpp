@@ -19,6 +19,7 @@
 #include "support/data.hpp"
 #include "support/random.hpp"
 
+namespace best_bin_first_test {
 namespace {
 
 using Tree = cairn::KdTree<float>;
@@ -132,3 +133,5 @@ TEST_SUITE("best_bin_first") {
     CHECK(kept >= true_matches * 98 / 100);
   }
 }
+
+}  // namespace best_bin_first_test

@@ -17,6 +17,7 @@
 #include "support/folder.hpp"
 #include "support/random.hpp"
 
+namespace bulk_match_test {
 namespace {
 
 using cairn::Rows;
@@ -156,3 +157,5 @@ TEST_SUITE("bulk_match") {
           }).find("nearest_two: query 0, coordinate 1 is nan") != std::string::npos);
   }
 }
+
+}  // namespace bulk_match_test

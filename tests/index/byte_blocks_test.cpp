@@ -15,6 +15,7 @@
 
 namespace detail = cairn::detail;
 
+namespace byte_blocks_test {
 namespace {
 
 std::vector<std::uint8_t> drawn(std::size_t count, cairn::Random& random) {
@@ -107,3 +108,5 @@ TEST_SUITE("byte_blocks") {
     }
   }
 }
+
+}  // namespace byte_blocks_test

@@ -20,6 +20,7 @@
 #include "support/folder.hpp"
 #include "support/random.hpp"
 
+namespace descriptor_index_test {
 namespace {
 
 using Points = cairn::Rows<float>;
@@ -227,3 +228,5 @@ TEST_SUITE("descriptor_index") {
           std::string::npos);
   }
 }
+
+}  // namespace descriptor_index_test

@@ -21,6 +21,7 @@
 #include "index/generators.hpp"
 #include "support/random.hpp"
 
+namespace fuzz_test {
 namespace {
 
 template <class Real>
@@ -207,3 +208,5 @@ TEST_SUITE("fuzz") {
       }
   }
 }
+
+}  // namespace fuzz_test

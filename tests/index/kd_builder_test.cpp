@@ -13,6 +13,7 @@
 #include "index/generators.hpp"
 #include "support/random.hpp"
 
+namespace kd_builder_test {
 namespace {
 
 /// Everything that tells two trees apart: ids and coordinates in leaf order, then the splits.
@@ -89,3 +90,5 @@ TEST_SUITE("kd_builder") {
     }
   }
 }
+
+}  // namespace kd_builder_test

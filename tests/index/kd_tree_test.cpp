@@ -21,6 +21,7 @@
 #include "support/folder.hpp"
 #include "support/random.hpp"
 
+namespace kd_tree_test {
 namespace {
 
 constexpr std::array<std::size_t, 13> sizes{0, 1, 2, 15, 16, 17, 31, 33, 100, 256, 257, 700, 4500};
@@ -266,3 +267,5 @@ TEST_SUITE("kd_tree") {
     CHECK(wrong == 0);
   }
 }
+
+}  // namespace kd_tree_test

@@ -16,6 +16,7 @@
 #include "support/folder.hpp"
 #include "support/random.hpp"
 
+namespace landmark_map_test {
 namespace {
 
 using cairn::LandmarkId;
@@ -279,3 +280,5 @@ TEST_SUITE("landmark_map") {
     CHECK_FALSE(store.match(here, 0, {}).has_value());
   }
 }
+
+}  // namespace landmark_map_test

@@ -22,6 +22,7 @@
 #include "support/folder.hpp"
 #include "support/random.hpp"
 
+namespace multi_kd_tree_test {
 namespace {
 
 using Point = std::array<float, 3>;
@@ -304,3 +305,5 @@ TEST_SUITE("multi_kd_tree") {
     CHECK(index.insert(std::vector<Point>{{1, 2, 3}}) == first + 1);
   }
 }
+
+}  // namespace multi_kd_tree_test

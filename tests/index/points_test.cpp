@@ -17,6 +17,7 @@
 
 #include "support/folder.hpp"
 
+namespace points_test {
 namespace {
 
 using Tree = cairn::KdTree<float, 3>;
@@ -111,3 +112,5 @@ TEST_SUITE("points") {
     CHECK(forest.insert(corners) == 4);
   }
 }
+
+}  // namespace points_test

@@ -14,6 +14,7 @@
 #include "index/generators.hpp"
 #include "support/random.hpp"
 
+namespace ratio_test_test {
 namespace {
 
 /// What a search does with a list of distances in some order.
@@ -85,3 +86,5 @@ TEST_SUITE("ratio_test") {
     CHECK(2 * early_work.leaves < whole_work.leaves);
   }
 }
+
+}  // namespace ratio_test_test

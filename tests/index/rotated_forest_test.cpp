@@ -17,6 +17,7 @@
 #include "support/folder.hpp"
 #include "support/random.hpp"
 
+namespace rotated_forest_test {
 namespace {
 
 using cairn::Rows;
@@ -106,3 +107,5 @@ TEST_SUITE("rotated_forest") {
           std::string::npos);
   }
 }
+
+}  // namespace rotated_forest_test

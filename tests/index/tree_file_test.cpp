@@ -15,6 +15,7 @@
 #include "support/folder.hpp"
 #include "support/random.hpp"
 
+namespace tree_file_test {
 namespace {
 
 using Tree = cairn::KdTree<float, 3>;
@@ -115,3 +116,5 @@ TEST_SUITE("tree_file") {
     CHECK(refusal(promising).find("ends early") != std::string::npos);
   }
 }
+
+}  // namespace tree_file_test

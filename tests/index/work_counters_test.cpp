@@ -17,6 +17,7 @@
 
 #include "index/generators.hpp"
 
+namespace work_counters_test {
 namespace {
 
 using Tree = cairn::KdTree<float, 3>;
@@ -98,3 +99,5 @@ TEST_SUITE("work_counters") {
     }
   }
 }
+
+}  // namespace work_counters_test

@@ -23,6 +23,7 @@ using cairn::Vector;
 using cairn_test::Folder;
 using cairn_test::message_of;
 
+namespace trajectory_test {
 namespace {
 
 Trajectory random_trajectory(cairn::Random& random, std::size_t count) {
@@ -192,3 +193,5 @@ TEST_SUITE("trajectory") {
     CHECK(std::abs(euroc[0].time - 1403715524.907143168) < 3e-7);
   }
 }
+
+}  // namespace trajectory_test

@@ -14,6 +14,7 @@
 
 #include "support/random.hpp"
 
+namespace jacobian_test {
 namespace {
 
 using cairn::Matrix;
@@ -120,3 +121,4 @@ TEST_SUITE("jacobian") {
 }
 
 }  // namespace
+}  // namespace jacobian_test

@@ -9,6 +9,7 @@
 #include <cairn/manifold/pack.hpp>
 #include <cairn/manifold/pack_math.hpp>
 
+namespace pack_test {
 namespace {
 
 constexpr int width = cairn::detail::pack_width<double>;
@@ -99,3 +100,4 @@ TEST_SUITE("pack") {
 }
 
 }  // namespace
+}  // namespace pack_test

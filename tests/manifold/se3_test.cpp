@@ -11,6 +11,7 @@
 
 #include "support/random.hpp"
 
+namespace se3_test {
 namespace {
 
 using cairn::Matrix;
@@ -100,3 +101,5 @@ TEST_SUITE("se3") {
     CHECK((SE3().cast<float>().cast<double>().matrix() - Matrix<4>::Identity()).norm() == 0.0);
   }
 }
+
+}  // namespace se3_test

@@ -12,6 +12,7 @@
 
 #include "support/random.hpp"
 
+namespace so3_test {
 namespace {
 
 using cairn::BasicSO3;
@@ -138,3 +139,5 @@ TEST_SUITE("so3") {
     CHECK(SO3::from_quaternion(-2, 0, 0, 0).angle() == 0.0);
   }
 }
+
+}  // namespace so3_test

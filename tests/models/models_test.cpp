@@ -14,6 +14,7 @@
 
 #include "support/random.hpp"
 
+namespace models_test {
 namespace {
 
 using cairn::Gaussian;
@@ -147,3 +148,4 @@ TEST_SUITE("models") {
 }
 
 }  // namespace
+}  // namespace models_test

@@ -11,6 +11,7 @@
 #include "support/random.hpp"
 #include "vision/pictures.hpp"
 
+namespace box_hessian_test {
 namespace {
 
 using cairn::detail::BoxFilter;
@@ -103,3 +104,5 @@ TEST_SUITE("box_hessian") {
     }
   }
 }
+
+}  // namespace box_hessian_test

@@ -12,6 +12,7 @@
 #include "support/random.hpp"
 #include "vision/pictures.hpp"
 
+namespace cell_grid_test {
 namespace {
 
 using cairn::detail::CellGrid;
@@ -103,3 +104,5 @@ TEST_SUITE("cell_grid") {
     }
   }
 }
+
+}  // namespace cell_grid_test

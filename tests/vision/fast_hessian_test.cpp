@@ -11,6 +11,7 @@
 
 #include "vision/pictures.hpp"
 
+namespace fast_hessian_test {
 namespace {
 
 std::vector<cairn::Keypoint> detect(cairn::ImageView image, const cairn::FastHessianOptions& options,
@@ -80,3 +81,5 @@ TEST_SUITE("fast_hessian") {
     CHECK(above == some.size());
   }
 }
+
+}  // namespace fast_hessian_test

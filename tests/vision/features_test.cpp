@@ -7,6 +7,7 @@
 
 #include <cairn/vision/features.hpp>
 
+namespace features_test {
 namespace {
 
 /// A detector and a descriptor of somebody else's, in the fewest lines.
@@ -54,3 +55,5 @@ TEST_SUITE("features") {
     CHECK(features.descriptor(1)[0] == 4);
   }
 }
+
+}  // namespace features_test

@@ -12,6 +12,7 @@
 
 #include "support/folder.hpp"
 
+namespace image_test {
 namespace {
 
 static_assert(std::regular<cairn::Image>);
@@ -65,3 +66,5 @@ TEST_SUITE("image") {
     CHECK(message_of([] { cairn::ImageView(nullptr, 0, 0, 0); }).empty());
   }
 }
+
+}  // namespace image_test

@@ -10,6 +10,7 @@
 #include "support/random.hpp"
 #include "vision/pictures.hpp"
 
+namespace integral_image_test {
 namespace {
 
 std::uint32_t pixel_by_pixel(const cairn::Image& image, int x0, int y0, int x1, int y1) {
@@ -61,3 +62,5 @@ TEST_SUITE("integral_image") {
     CHECK(sums.box(0, 0, 0, 0) == 0);
   }
 }
+
+}  // namespace integral_image_test

@@ -10,6 +10,7 @@
 
 #include "support/random.hpp"
 
+namespace keypoint_selection_test {
 namespace {
 
 std::vector<cairn::Keypoint> scattered(std::size_t count, std::uint64_t seed) {
@@ -92,3 +93,5 @@ TEST_SUITE("keypoint_selection") {
     CHECK(threshold.value == threshold.lowest);
   }
 }
+
+}  // namespace keypoint_selection_test

@@ -10,6 +10,7 @@
 
 #include "support/random.hpp"
 
+namespace quadratic_peak_test {
 namespace {
 
 using cairn::detail::Neighbourhood;
@@ -60,3 +61,5 @@ TEST_SUITE("quadratic_peak") {
         sampled([](double x, double y, double s) { return -x * x - y * y + s * s; })));
   }
 }
+
+}  // namespace quadratic_peak_test

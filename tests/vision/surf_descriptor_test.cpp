@@ -14,6 +14,7 @@
 #include "support/random.hpp"
 #include "vision/pictures.hpp"
 
+namespace surf_descriptor_test {
 namespace {
 
 /// Sum over a square of side `size` about (x, y), pixels being unit squares; doubles throughout.
@@ -127,3 +128,5 @@ TEST_SUITE("surf_descriptor") {
     }
   }
 }
+
+}  // namespace surf_descriptor_test

@@ -11,6 +11,7 @@
 #include "support/random.hpp"
 #include "vision/pictures.hpp"
 
+namespace surf_orientation_test {
 namespace {
 
 using cairn::detail::CellGrid;
@@ -83,3 +84,5 @@ TEST_SUITE("surf_orientation") {
     CHECK(cairn::detail::dominant_angle(plain) == 0);
   }
 }
+
+}  // namespace surf_orientation_test

@@ -17,6 +17,7 @@
 #include "support/random.hpp"
 #include "vision/pictures.hpp"
 
+namespace surf_test {
 namespace {
 
 using cairn_test::message_of;
@@ -326,3 +327,5 @@ TEST_SUITE("surf") {
           doctest::Approx(cairn::threshold_from_opensurf(5.3e-5F)).epsilon(0.01));
   }
 }
+
+}  // namespace surf_test

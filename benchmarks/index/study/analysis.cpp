@@ -13,16 +13,16 @@
 namespace cairn_study {
 namespace {
 
-constexpr std::size_t grid_size = 48;
+constexpr std::size_t grid_size = 64;
 
 std::vector<double> make_grid(const Stream& stream) {
   std::vector<double> grid;
   const double step = static_cast<double>(stream.step);
-  const double last = static_cast<double>(stream.steps()) * step;
+  const auto steps = static_cast<double>(stream.steps());
   for (std::size_t i = 0; i < grid_size; ++i) {
     const double share = static_cast<double>(i) / (grid_size - 1);
-    const double n = std::round(last * std::pow(64.0, share - 1) / step) * step;
-    if (n >= step && (grid.empty() || n > grid.back())) grid.push_back(n);
+    const double n = std::round(std::pow(steps, share)) * step;
+    if (grid.empty() || n > grid.back()) grid.push_back(n);
   }
   return grid;
 }
@@ -36,13 +36,13 @@ std::vector<double> totals(const Drive& drive, const std::vector<double>& grid,
   std::size_t next = 0;
   for (const double n : grid) {
     for (; next < drive.samples.size() && drive.samples[next].points <= n; ++next) {
-      sum += value(drive.samples[next]) * static_cast<double>(drive.stride);
+      sum += value(drive.samples[next]) * drive.samples[next].steps;
       points = drive.samples[next].points;
     }
     double rest = 0;
     if (next < drive.samples.size() && n > points) {
       const double share = (n - points) / (drive.samples[next].points - points);
-      rest = share * value(drive.samples[next]) * static_cast<double>(drive.stride);
+      rest = share * value(drive.samples[next]) * drive.samples[next].steps;
     }
     sums.push_back(sum + rest);
   }

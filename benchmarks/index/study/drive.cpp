@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <span>
+#include <utility>
 
 #include <cairn/core/random.hpp>
 
@@ -105,24 +106,26 @@ Truth make_truth(const Stream& stream) {
 Drive run(const Stream& stream, const Truth& truth, Store& store, const RunOptions& options,
           const std::function<void()>& progress) {
   Drive drive;
-  drive.stride = options.stride;
   const std::size_t timed = std::min(options.timed, stream.timed);
   std::vector<float> queries(timed * stream.dim);
   std::vector<Found> answers(timed);
   std::uint64_t moved = 0;
   const std::vector<std::size_t> checks = checked_steps(stream);
+  double sampled = 0;  // steps up to the last one timed
   for (std::size_t step = 0; step < stream.steps(); ++step, progress()) {
     const auto rows =
         std::span(stream.rows).subspan(step * stream.step * stream.dim, stream.step * stream.dim);
     const std::size_t present = (step + 1) * stream.step;
     const bool is_checked = std::find(checks.begin(), checks.end(), step) != checks.end();
-    if ((step + 1) % options.stride != 0 && !is_checked) {
+    const auto steps = static_cast<double>(step + 1);
+    if (steps < sampled * (1 + options.gap) && !is_checked) {
       store.stage(rows);
       continue;
     }
     for (std::size_t i = 0; i < timed; ++i) stream.make_query(step, i, present, &queries[i * stream.dim]);
     Sample sample;
     sample.points = static_cast<double>(present);
+    sample.steps = steps - std::exchange(sampled, steps);
     moved = store.points_moved();
     const std::uint64_t distances = store.work.distances;
     double begin = cpu_seconds();
@@ -136,7 +139,7 @@ Drive run(const Stream& stream, const Truth& truth, Store& store, const RunOptio
     sample.moved = static_cast<double>(store.points_moved() - moved);
     sample.distances = static_cast<double>(store.work.distances - distances) / static_cast<double>(timed);
     sample.trees = static_cast<double>(store.trees());
-    if ((step + 1) % options.stride == 0) drive.samples.push_back(sample);
+    drive.samples.push_back(sample);
     if (is_checked) check(stream, truth, step, store, options.exact, drive);
   }
   return drive;

@@ -38,6 +38,7 @@ struct Stream {
 /// A step that was timed.
 struct Sample {
   double points = 0;     ///< n after the insertion
+  double steps = 1;      ///< it stands for: itself and those before it that were not timed
   double build = 0;      ///< CPU seconds of the insertion
   double search = 0;     ///< CPU seconds of all s queries
   double bytes = 0;      ///< held, the points included
@@ -60,7 +61,6 @@ Truth make_truth(const Stream& stream);
 
 struct Drive {
   std::string name = {};        ///< "q = 4, z = 10"
-  std::size_t stride = 1;       ///< every so many-th step was timed
   std::size_t growth = 0;       ///< q; 0 where there is no forest
   std::size_t first_steps = 0;  ///< z
   std::vector<Sample> samples;
@@ -71,9 +71,9 @@ struct Drive {
 };
 
 struct RunOptions {
-  std::size_t stride = 1;  ///< every so many-th step is timed
-  std::size_t timed = 1;   ///< queries of a step that are asked
-  bool exact = false;      ///< every answer must be the nearest
+  double gap = 0;         ///< steps after a timed one are timed again when n has grown by this share
+  std::size_t timed = 1;  ///< queries of a step that are asked
+  bool exact = false;     ///< every answer must be the nearest
 };
 
 /// Runs a stream through a store. `progress` is called after every step.

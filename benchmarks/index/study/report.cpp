@@ -173,8 +173,9 @@ example::Report make_report(const std::vector<Study>& studies, const std::string
        .hint = "against distances summed in double",
        .verdict = wrong == 0 ? example::KeyFigure::Verdict::good : example::KeyFigure::Verdict::bad});
   report.note(
-      "Times are CPU times of one thread. The single tree and the scan are timed at every so many-th step "
-      "only; their costs between are interpolated. Costs a step are means over the steps since n / 2.");
+      "Times are CPU times of one thread. The single tree and the scan are timed whenever n has grown "
+      "by a twentieth; each of these steps stands for those before it. Costs a step are means over the steps "
+      "since n / 2.");
   for (const Study& study : studies) {
     add_panels(report, study);
     add_table(report, study);

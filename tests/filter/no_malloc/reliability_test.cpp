@@ -6,13 +6,6 @@
 #include <cstdint>
 #include <stdexcept>
 
-// Eigen takes memory by malloc; while forbidden, it asserts, and the assertion throws.
-#define EIGEN_RUNTIME_NO_MALLOC
-#define eigen_assert(condition)                           \
-  do {                                                    \
-    if (!(condition)) throw std::logic_error(#condition); \
-  } while (false)
-
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
@@ -24,8 +17,10 @@
 #include <cairn/filter/unscented.hpp>
 
 #include "filter/linear_problems.hpp"
+#include "filter/no_malloc/eigen.hpp"
 #include "support/random.hpp"
 
+namespace reliability_test {
 namespace {
 
 using cairn::Form;
@@ -35,12 +30,7 @@ using cairn::Matrix;
 using cairn::Status;
 using cairn::Vector;
 using cairn_test::LinearProblem;
-
-// Forbids Eigen to allocate while it lives.
-struct NoAllocation {
-  NoAllocation() { Eigen::internal::set_is_malloc_allowed(false); }
-  ~NoAllocation() { Eigen::internal::set_is_malloc_allowed(true); }
-};
+using cairn_test::NoAllocation;
 
 TEST_SUITE("reliability") {
   TEST_CASE("filters: predict and update never allocate for fixed sizes") {
@@ -209,3 +199,4 @@ TEST_SUITE("reliability") {
 }
 
 }  // namespace
+}  // namespace reliability_test

@@ -1,14 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 #include <cmath>
-#include <stdexcept>
-
-// Eigen takes memory by malloc; while forbidden, it asserts, and the assertion throws.
-#define EIGEN_RUNTIME_NO_MALLOC
-#define eigen_assert(condition)                           \
-  do {                                                    \
-    if (!(condition)) throw std::logic_error(#condition); \
-  } while (false)
 
 #include <doctest/doctest.h>
 
@@ -17,8 +9,10 @@
 #include <cairn/filter/square_root_information.hpp>
 
 #include "filter/linear_problems.hpp"
+#include "filter/no_malloc/eigen.hpp"
 #include "support/random.hpp"
 
+namespace square_root_information_test {
 namespace {
 
 using cairn::Gaussian;
@@ -142,11 +136,11 @@ TEST_SUITE("square_root_information") {
     CHECK(belief.root == before.root);
     CHECK(belief.vector == before.vector);
     CHECK_FALSE(Belief<3>::from({Vector<3>::Zero(), Matrix<3>::Zero()}).has_value());
-    Eigen::internal::set_is_malloc_allowed(false);
+    const cairn_test::NoAllocation guard;
     CHECK(filter.predict(belief, p.process, 1.0) == Status::accepted);
     CHECK(filter.update(belief, p.sensor, Vector<2>(1, 2)) == Status::accepted);
-    Eigen::internal::set_is_malloc_allowed(true);
   }
 }
 
 }  // namespace
+}  // namespace square_root_information_test

@@ -1,14 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 #include <cmath>
-#include <stdexcept>
-
-// Eigen takes memory by malloc; while forbidden, it asserts, and the assertion throws.
-#define EIGEN_RUNTIME_NO_MALLOC
-#define eigen_assert(condition)                           \
-  do {                                                    \
-    if (!(condition)) throw std::logic_error(#condition); \
-  } while (false)
 
 #include <doctest/doctest.h>
 
@@ -21,8 +13,10 @@
 #include <cairn/models/motion.hpp>
 
 #include "filter/linear_problems.hpp"
+#include "filter/no_malloc/eigen.hpp"
 #include "support/random.hpp"
 
+namespace augmented_test {
 namespace {
 
 using cairn::AugmentedUnscented;
@@ -216,11 +210,12 @@ TEST_SUITE("augmented") {
     CHECK(filter.step(belief, p.process, {}, 1, broken.sensor, z).status == Status::not_positive_definite);
     CHECK(belief.mean == p.prior.mean);
     CHECK(belief.covariance == p.prior.covariance);
-    Eigen::internal::set_is_malloc_allowed(false);
-    CHECK(filter.predict(belief, p.process, 1) == Status::accepted);
-    CHECK(filter.update(belief, p.sensor, z).accepted());
-    CHECK(filter.step(belief, p.process, {}, 1, p.sensor, z).accepted());
-    Eigen::internal::set_is_malloc_allowed(true);
+    {
+      const cairn_test::NoAllocation guard;
+      CHECK(filter.predict(belief, p.process, 1) == Status::accepted);
+      CHECK(filter.update(belief, p.sensor, z).accepted());
+      CHECK(filter.step(belief, p.process, {}, 1, p.sensor, z).accepted());
+    }
     belief.covariance(0, 0) = -1;
     CHECK(filter.predict(belief, p.process, 1) == Status::not_positive_definite);
     CHECK(filter.step(belief, p.process, {}, 1, p.sensor, z).status == Status::not_positive_definite);
@@ -228,3 +223,4 @@ TEST_SUITE("augmented") {
 }
 
 }  // namespace
+}  // namespace augmented_test
