@@ -11,6 +11,8 @@
 #include <cairn/models/motion.hpp>
 #include <cairn/models/sensor.hpp>
 
+#include "filter/linear_problems.hpp"
+
 namespace continuous_test {
 namespace {
 
@@ -120,17 +122,12 @@ TEST_SUITE("information") {
     const auto start = InformationBelief<Vector<2>>::ignorant(Vector<2>(0, 0));
     auto belief = start;
     CHECK_FALSE(belief.gaussian().has_value());
-    // a line through three points: level and slope, all variances 0.25
-    Matrix<3, 2> design;
-    design << 1, 0, 1, 1, 1, 2;
-    const Vector<3> y(1.0, 2.5, 3.0);
-    for (int i = 0; i < 3; ++i) {
-      const cairn::LinearSensor<1, 2> sensor{design.row(i), Matrix<1>(0.25)};
-      REQUIRE(InformationFilter{}.update(belief, sensor, Vector<1>(y(i))) == Status::accepted);
-    }
+    const cairn_test::LineFit line;
+    for (int i = 0; i < line.points; ++i)
+      REQUIRE(InformationFilter{}.update(belief, line.sensor(i), line.height(i)) == Status::accepted);
     const auto found = belief.gaussian().value();
-    CHECK((found.mean - Vector<2>(7.0 / 6.0, 1.0)).norm() < 1e-14);
-    const Matrix<2> normal = 4.0 * design.transpose() * design;
+    CHECK((found.mean - line.solution).norm() < 1e-14);
+    const Matrix<2> normal = 4.0 * line.design.transpose() * line.design;
     CHECK((found.covariance * normal - Matrix<2>::Identity()).norm() < 1e-13);
     // predicting with half the state unseen keeps the other half's ignorance
     auto half = start;

@@ -48,6 +48,20 @@ struct LinearProblem {
   }
 };
 
+/// Level and slope of a line through three points, seen one by one with variance 0.25: where a filter that
+/// starts from nothing must end.
+struct LineFit {
+  static constexpr int points = 3;
+  cairn::Matrix<points, 2> design{{1, 0}, {1, 1}, {1, 2}};
+  cairn::Vector<points> heights{1.0, 2.5, 3.0};
+  cairn::Vector<2> solution{7.0 / 6.0, 1.0};  ///< of least squares
+
+  [[nodiscard]] cairn::LinearSensor<1, 2> sensor(int i) const {
+    return {design.row(i), cairn::Matrix<1>(0.25)};
+  }
+  [[nodiscard]] cairn::Vector<1> height(int i) const { return cairn::Vector<1>(heights(i)); }
+};
+
 /// Largest entry of |a - b| relative to the largest of |b|.
 template <class A, class B>
 double relative_error(const A& a, const B& b) {

@@ -70,17 +70,15 @@ TEST_SUITE("square_root_information") {
   TEST_CASE("square_root_information: starts from nothing and ends where least squares does") {
     auto belief = Belief<2>::ignorant(Vector<2>(5, -5));
     CHECK_FALSE(belief.gaussian().has_value());
-    Matrix<3, 2> design;
-    design << 1, 0, 1, 1, 1, 2;
-    const Vector<3> y(1.0, 2.5, 3.0);
-    for (int i = 0; i < 3; ++i) {
-      const cairn::LinearSensor<1, 2> sensor{design.row(i), Matrix<1>(0.25)};
-      REQUIRE(SquareRootInformationFilter{}.update(belief, sensor, Vector<1>(y(i))) == Status::accepted);
+    const cairn_test::LineFit line;
+    for (int i = 0; i < line.points; ++i) {
+      REQUIRE(SquareRootInformationFilter{}.update(belief, line.sensor(i), line.height(i)) ==
+              Status::accepted);
       CHECK(belief.gaussian().has_value() == (i > 0));
     }
     const auto found = belief.gaussian().value();
-    CHECK((found.mean - Vector<2>(7.0 / 6.0, 1.0)).norm() < 1e-13);
-    const Matrix<2> normal = 4.0 * design.transpose() * design;
+    CHECK((found.mean - line.solution).norm() < 1e-13);
+    const Matrix<2> normal = 4.0 * line.design.transpose() * line.design;
     CHECK((found.covariance * normal - Matrix<2>::Identity()).norm() < 1e-13);
     // a prediction keeps the ignorance of what nobody saw
     auto half = Belief<2>::ignorant(Vector<2>(0, 0));

@@ -54,7 +54,7 @@ export function bars(panel, body) {
 
 export function table(panel, body) {
   const numeric = panel.columns.map((_, column) =>
-    panel.rows.length > 0 && panel.rows.every((row) => row[column] === '' || row[column] === '-' || Number.isFinite(Number(row[column]))));
+    panel.rows.length > 0 && panel.rows.every((row) => ['', '-'].includes(row[column]) || Number.isFinite(Number(row[column]))));
   const line = (tag, cells) => element('tr', {}, ...cells.map((cell, i) => element(tag, { className: numeric[i] ? 'number' : '' }, cell)));
   body.append(element('div', { className: 'scroll' },
     element('table', { className: 'cells' },
