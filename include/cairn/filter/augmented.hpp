@@ -49,23 +49,47 @@ struct PointPairs {
   void set(int column, const Y& up, const Y& down) {
     const Tangent<Y> a = local(center, up);
     const Tangent<Y> b = local(center, down);
-    const Tangent<Y> odd_part = S(0.5) * (a - b);
-    Tangent<Y> even_part = S(0.5) * (a + b);
+    Tangent<Y> odd_part = a, even_part = b;
+    for (int i = 0; i < rows(); ++i) {
+      odd_part(i) = S(0.5) * (a(i) - b(i));
+      even_part(i) = S(0.5) * (a(i) + b(i));
+    }
     drop_noise<Y>(center, odd_part, even_part);
-    odd.col(column) = odd_part;
-    even.col(column) = even_part;
-    shift += even_part;
+    for (int i = 0; i < rows(); ++i) {
+      odd(i, column) = odd_part(i);
+      even(i, column) = even_part(i);
+      shift(i) += even_part(i);
+    }
   }
-  [[nodiscard]] Y up(int column) const {
-    return retract(center, Tangent<Y>(even.col(column) + odd.col(column)));
-  }
-  [[nodiscard]] Y down(int column) const {
-    return retract(center, Tangent<Y>(even.col(column) - odd.col(column)));
-  }
+  [[nodiscard]] Y up(int column) const { return point(column, S(1)); }
+  [[nodiscard]] Y down(int column) const { return point(column, S(-1)); }
   [[nodiscard]] Y mean() const { return retract(center, shift); }
+
+  /// w (sum of odd odd^T + even even^T of both) + extra shift shift^T: covariance with other pairs that went
+  /// through another function. O(rows of both, columns).
+  template <Manifold Z>
+  [[nodiscard]] Matrix<dof<Y>, dof<Z>, S> moment(const PointPairs<Z, K>& other, const S& w,
+                                                 const S& extra) const {
+    Matrix<dof<Y>, dof<Z>, S> sum(rows(), other.rows());
+    for (int j = 0; j < other.rows(); ++j)
+      for (int i = 0; i < rows(); ++i) {
+        S entry(0);
+        for (int k = 0; k < static_cast<int>(odd.cols()); ++k)
+          entry += odd(i, k) * other.odd(j, k) + even(i, k) * other.even(j, k);
+        sum(i, j) = w * entry + extra * (shift(i) * other.shift(j));
+      }
+    return sum;
+  }
   [[nodiscard]] CovarianceOf<Y> covariance(const S& w, const S& extra) const {
-    const CovarianceOf<Y> sum = odd * odd.transpose() + even * even.transpose();
-    return symmetrised(w * sum + extra * (shift * shift.transpose()));
+    return symmetrised(moment(*this, w, extra));
+  }
+  [[nodiscard]] int rows() const { return static_cast<int>(shift.size()); }
+
+private:
+  [[nodiscard]] Y point(int column, const S& sign) const {
+    Tangent<Y> step = shift;
+    for (int i = 0; i < rows(); ++i) step(i) = even(i, column) + sign * odd(i, column);
+    return retract(center, step);
   }
 };
 
@@ -270,11 +294,8 @@ private:
     }
     const S w = S(1) / (c * c);
     seen.shift *= w;
-    const Matrix<dof<X>, dof<Z>, S> sum =
-        prior.odd * seen.odd.transpose() + prior.even * seen.even.transpose();
-    const Matrix<dof<X>, dof<Z>, S> cross = w * sum + extra<S>() * (prior.shift * seen.shift.transpose());
-    return detail::correct_by_moments<X, dof<Z>>(belief, cross, seen.covariance(w, extra<S>()),
-                                                 local(seen.mean(), z), gate);
+    return detail::correct_by_moments<X, dof<Z>>(belief, prior.moment(seen, w, extra<S>()),
+                                                 seen.covariance(w, extra<S>()), local(seen.mean(), z), gate);
   }
 
   template <class H>

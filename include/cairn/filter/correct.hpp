@@ -85,11 +85,19 @@ template <int N, int M, class S, class H>
     gain[j].scale(c.inverse_root[j]);
     for (int i = j + 1; i < M; ++i) gain[j].subtract(gain[i], c.lower[i][j]);
   }
+  const Matrix<M, N, S> rows = dense_of(h);
   Matrix<N, M, S> k;
+  Matrix<N, N, S> a, zero;
   for (int j = 0; j < M; ++j) gain[j].store(k.data() + j * N);
-  Matrix<N, N, S> a = -(k * dense_of(h)).eval();
-  for (int i = 0; i < N; ++i) a(i, i) += S(1);
-  return congruence(a, p, congruence(k, r, Matrix<N, N, S>::Zero().eval()));
+  for (int j = 0; j < N; ++j) {
+    Column<N, S> column;
+    column.set_zero();
+    column.store(zero.data() + j * N);
+    for (int m = 0; m < M; ++m) column.subtract(gain[m], rows(m, j));
+    column.store(a.data() + j * N);
+    a(j, j) += S(1);
+  }
+  return congruence(a, p, congruence(k, r, zero));
 }
 
 /// One number at a time: z_j = h_j x + noise of variance d_j, after L^-1 with R = L diag(d) L^T.
@@ -103,25 +111,29 @@ template <int N, int M, class S, class H>
   if (!factor(r, lower, inverse_root)) return false;
   Matrix<M, N, S> rows = dense_of(h);
   Vector<M, S> left = residual;
-  Matrix<N, N, S> p = prior;
-  Vector<N, S> step = Vector<N, S>::Zero();
+  load_columns(prior, lowered);
+  moved.set_zero();
   nis = S(0);
   for (int j = 0; j < M; ++j) {
     for (int k = 0; k < j; ++k) {
-      rows.row(j) -= lower[j][k] * rows.row(k);
+      for (int i = 0; i < N; ++i) rows(j, i) -= lower[j][k] * rows(k, i);
       left(j) -= lower[j][k] * left(k);
     }
-    const Vector<N, S> ph = p * rows.row(j).transpose();
-    const S variance = rows.row(j).dot(ph) + S(1) / (inverse_root[j] * inverse_root[j]);
+    Column<N, S> w[1];  // P h_j, then in units of the deviation of z_j
+    w[0].set_zero();
+    for (int i = 0; i < N; ++i) w[0].add(lowered[i], rows(j, i));
+    S variance = S(1) / (inverse_root[j] * inverse_root[j]);
+    S error = left(j);
+    for (int i = 0; i < N; ++i) {
+      variance += rows(j, i) * w[0][i];
+      error -= rows(j, i) * moved[i];
+    }
     if (!(variance > S(0))) return false;
-    const S error = left(j) - rows.row(j).dot(step);
-    const Vector<N, S> w = ph / sqrt(variance);
-    p -= w * w.transpose();
-    step += ph * (error / variance);
+    moved.add(w[0], error / variance);
     nis += error * error / variance;
+    w[0].scale(S(1) / sqrt(variance));
+    lower_by_squares(lowered, w);
   }
-  load_columns(p, lowered);
-  moved.load(step.data());
   return true;
 }
 

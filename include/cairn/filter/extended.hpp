@@ -90,13 +90,10 @@ template <class H, Manifold X>
 }
 
 /// Derivative at d = e of the step seen from x = prior (+) e: how tangent vectors move from the prior's mean
-/// to x. The identity for vectors.
+/// to x. Nothing to move between vectors: their tangent space is one.
 template <Manifold X>
 [[nodiscard]] CovarianceOf<X> transport(const X& prior, const Tangent<X>& e) {
-  if constexpr (is_vector<X>)
-    return CovarianceOf<X>::Identity(e.size(), e.size());
-  else
-    return numeric_jacobian([&](const Tangent<X>& d) -> X { return retract(prior, d); }, e);
+  return numeric_jacobian([&](const Tangent<X>& d) -> X { return retract(prior, d); }, e);
 }
 
 }  // namespace detail
@@ -112,11 +109,10 @@ Status Extended::iterate(Gaussian<typename H::State>& belief, const H& sensor,
   Tangent<X> e = local(belief.mean, belief.mean);
   S cost = detail::posterior_cost(belief, e, sensor, z);
   CovarianceOf<X> covariance = belief.covariance;
-  CovarianceOf<X> transport = detail::transport(belief.mean, e);
   for (int k = 0; k < iterations; ++k) {
     const X x = retract(belief.mean, e);
-    transport = detail::transport(belief.mean, e);
-    const Matrix<m, n, S> h = detail::dense_of(sensor.jacobian(x)) * transport;
+    Matrix<m, n, S> h = detail::dense_of(sensor.jacobian(x));
+    if constexpr (!detail::is_vector<X>) h = (h * detail::transport(belief.mean, e)).eval();
     Vector<m, S> residual = local(typename H::Measurement(sensor.predict(x)), z);
     residual += h * e;
     const Matrix<m, m, S> noise = sensor.noise(x);
@@ -139,9 +135,12 @@ Status Extended::iterate(Gaussian<typename H::State>& belief, const H& sensor,
     if (size <= static_cast<S>(tolerance * tolerance)) break;
   }
   if (!detail::all_finite(e) || !detail::finite_state(belief.mean)) return Status::not_finite;
-  transport = detail::transport(belief.mean, e);
+  if constexpr (!detail::is_vector<X>) {
+    const CovarianceOf<X> transport = detail::transport(belief.mean, e);
+    covariance = symmetrised(transport * covariance * transport.transpose());
+  }
   belief.mean = retract(belief.mean, e);
-  belief.covariance = symmetrised(transport * covariance * transport.transpose());
+  belief.covariance = covariance;
   return Status::accepted;
 }
 

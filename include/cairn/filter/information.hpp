@@ -15,10 +15,12 @@
 #include <concepts>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/filter/structure.hpp>
@@ -62,25 +64,27 @@ template <int N, int C, class S>
 [[nodiscard]] bool solve_square(Matrix<N, N, S> a, Matrix<N, C, S>& b) {
   using std::abs;
   const int n = static_cast<int>(a.rows());
+  const int columns = static_cast<int>(b.cols());
   for (int j = 0; j < n; ++j) {
     int best = j;
     for (int i = j + 1; i < n; ++i)
       if (abs(a(i, j)) > abs(a(best, j))) best = i;
     if (!(abs(a(best, j)) > S(0))) return false;
     if (best != j) {
-      a.row(j).swap(a.row(best));
-      b.row(j).swap(b.row(best));
+      for (int k = j; k < n; ++k) std::swap(a(j, k), a(best, k));
+      for (int k = 0; k < columns; ++k) std::swap(b(j, k), b(best, k));
     }
     for (int i = j + 1; i < n; ++i) {
       const S factor = a(i, j) / a(j, j);
-      a.row(i) -= factor * a.row(j);
-      b.row(i) -= factor * b.row(j);
+      for (int k = j; k < n; ++k) a(i, k) -= factor * a(j, k);
+      for (int k = 0; k < columns; ++k) b(i, k) -= factor * b(j, k);
     }
   }
-  for (int j = n - 1; j >= 0; --j) {
-    for (int k = j + 1; k < n; ++k) b.row(j) -= a(j, k) * b.row(k);
-    b.row(j) /= a(j, j);
-  }
+  for (int k = 0; k < columns; ++k)
+    for (int j = n - 1; j >= 0; --j) {
+      for (int i = j + 1; i < n; ++i) b(j, k) -= a(j, i) * b(i, k);
+      b(j, k) /= a(j, j);
+    }
   return true;
 }
 
@@ -112,15 +116,18 @@ struct InformationFilter {
     const CovarianceOf<X> g = detail::semi_definite_root<n, S>(q);
     if (!detail::all_finite(f) || !detail::all_finite(q)) return Status::not_finite;
     if (!detail::solve_square<n, n, S>(f, inverse)) return Status::not_positive_definite;
-    const S kept = S(1) / static_cast<S>(fading);
-    const CovarianceOf<X> m = kept * symmetrised(inverse.transpose() * next.information * inverse);
-    const Tangent<X> y = kept * (inverse.transpose() * next.vector);
-    const CovarianceOf<X> mg = m * g;
-    const CovarianceOf<X> inner = CovarianceOf<X>::Identity(size, size) + g.transpose() * mg;
+    const CovarianceOf<X> back = detail::transposed<n, n, S>(inverse) / static_cast<S>(fading);
+    const CovarianceOf<X> m = symmetrised(detail::product(back, detail::product(next.information, inverse)));
+    const Tangent<X> y = detail::product(back, next.vector);
+    const CovarianceOf<X> gt = detail::transposed<n, n, S>(g);
+    const CovarianceOf<X> mg = detail::product(m, g);
+    CovarianceOf<X> inner = detail::product(gt, mg);
+    for (int i = 0; i < size; ++i) inner(i, i) += S(1);
     const Cholesky<n, S> root(inner);
     if (!root.good()) return Status::not_positive_definite;
-    next.information = symmetrised(m - mg * root.solve(CovarianceOf<X>(mg.transpose())));
-    next.vector = y - mg * root.solve(g.transpose() * y);
+    const CovarianceOf<X> lost = detail::product(mg, root.solve(detail::transposed<n, n, S>(mg)));
+    next.information = symmetrised(m - lost);
+    next.vector = y - detail::product(mg, root.solve(detail::product(gt, y)));
     next.point = process.propagate(next.point, control, dt);
     return keep(belief, next);
   }
@@ -147,8 +154,8 @@ struct InformationFilter {
       return detail::all_finite(r) ? Status::not_positive_definite : Status::not_finite;
     const Matrix<m, dof<X>, S> white = root.whiten(h);
     InformationBelief<X> next = belief;
-    next.information += white.transpose() * white;
-    next.vector += white.transpose() * root.whiten(residual);
+    add_transposed_product(next.information, white, white);
+    add_transposed_product(next.vector, white, root.whiten(residual));
     return keep(belief, next);
   }
 

@@ -187,6 +187,49 @@ template <class A, int N, class S, class Q>
   }
 }
 
+/// A x + b. An empty b of run-time size is zero.
+template <int R, int C, class S>
+[[gnu::always_inline]] [[nodiscard]] inline Vector<R, S> affine(const Matrix<R, C, S>& a,
+                                                                const Vector<C, S>& x,
+                                                                const Vector<R, S>& b) {
+  if constexpr (R == dynamic || C == dynamic) {
+    Vector<R, S> y = a * x;
+    if (b.size() != 0) y += b;
+    return y;
+  } else {
+    Column<R, S> sum, column;
+    sum.load(b.data());
+    each<C>([&](int j) {
+      column.load(a.data() + j * R);
+      sum.add(column, x(j));
+    });
+    Vector<R, S> y;
+    sum.store(y.data());
+    return y;
+  }
+}
+
+/// A B. A product of Eigen's, which run-time sizes take, costs a tenth of a second of compiling for each
+/// shape.
+template <int R, int C, int K, class S>
+[[nodiscard]] Matrix<R, K, S> product(const Matrix<R, C, S>& a, const Matrix<C, K, S>& b) {
+  if constexpr (R == dynamic || C == dynamic || K == dynamic) {
+    return a * b;
+  } else {
+    Matrix<R, K, S> out;
+    for (int k = 0; k < K; ++k) {
+      Column<R, S> sum, column;
+      sum.set_zero();
+      for (int j = 0; j < C; ++j) {
+        column.load(a.data() + j * R);
+        sum.add(column, b(j, k));
+      }
+      sum.store(out.data() + k * R);
+    }
+    return out;
+  }
+}
+
 /// A P A^T + Q for symmetric P and Q, symmetric bit for bit. A is R x C.
 template <class A, int C, int R, class S>
 [[nodiscard]] Matrix<R, R, S> congruence(const A& a, const Matrix<C, C, S>& p, const Matrix<R, R, S>& q) {

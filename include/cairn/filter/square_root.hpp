@@ -21,6 +21,7 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/correct.hpp>
 #include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/sigma_points.hpp>
 #include <cairn/filter/status.hpp>
@@ -82,6 +83,13 @@ template <class Root, class Array>
   for (int j = 0; j < size; ++j)
     for (int i = j; i < size; ++i) root(i, j) = array(from + j, from + i);
   return root;
+}
+
+/// Writes a^T into `array` from (row, column) on.
+template <class Array, class A>
+void put_transposed(Array& array, int row, int column, const A& a) {
+  for (int j = 0; j < static_cast<int>(a.cols()); ++j)
+    for (int i = 0; i < static_cast<int>(a.rows()); ++i) array(row + j, column + i) = a(i, j);
 }
 
 /// Keeps L' = top^T of a triangularised array if it is finite.
@@ -155,9 +163,10 @@ struct SquareRoot {
     const Status status = detail::stabilise<X>(q, fading, stabilising_noise);
     if (status != Status::accepted) return status;
     Matrix<detail::size_sum<n, n>, n, S> array(2 * size, size);
-    array.topRows(size) = (f * belief.root).transpose();
-    if (fading != 1.0) array.topRows(size) *= sqrt(static_cast<S>(fading));
-    array.bottomRows(size) = detail::semi_definite_root<n, S>(q).transpose();
+    CovarianceOf<X> moved = detail::product(f, belief.root);
+    if (fading != 1.0) moved *= sqrt(static_cast<S>(fading));
+    detail::put_transposed(array, 0, 0, moved);
+    detail::put_transposed(array, size, 0, detail::semi_definite_root<n, S>(q));
     detail::triangularise(array);
     return detail::keep_root(belief, X(process.propagate(belief.mean, control, dt)), array, size);
   }
@@ -188,9 +197,9 @@ struct SquareRoot {
     }
     Matrix<detail::size_sum<m, n>, detail::size_sum<m, n>, S> array(ms + ns, ms + ns);
     array.setZero();
-    array.topLeftCorner(ms, ms) = detail::semi_definite_root<m, S>(r).transpose();
-    array.bottomLeftCorner(ns, ms) = (h * belief.root).transpose();
-    array.bottomRightCorner(ns, ns) = belief.root.transpose();
+    detail::put_transposed(array, 0, 0, detail::semi_definite_root<m, S>(r));
+    detail::put_transposed(array, ms, 0, detail::product(h, belief.root));
+    detail::put_transposed(array, ms, ms, belief.root);
     if (!detail::all_finite(r)) array(0, 0) = std::numeric_limits<S>::quiet_NaN();
     return detail::correct_by_array<X, m>(belief, array, residual, gate);
   }
@@ -221,8 +230,9 @@ struct SquareRootUnscented {
     Matrix<rows, n, S> array(3 * size + 1, size);
     const auto f = [&](const X& x) -> X { return process.propagate(x, control, dt); };
     const X mean = spread(belief, f, array);
-    if (fading != 1.0) array.topRows(2 * size + 1) *= sqrt(static_cast<S>(fading));
-    array.bottomRows(size) = detail::semi_definite_root<n, S>(q).transpose();
+    for (int j = 0; j < size; ++j)
+      for (int i = 0; i <= 2 * size && fading != 1.0; ++i) array(i, j) *= sqrt(static_cast<S>(fading));
+    detail::put_transposed(array, 2 * size + 1, 0, detail::semi_definite_root<n, S>(q));
     detail::triangularise(array);
     return detail::keep_root(belief, mean, array, size);
   }
@@ -250,9 +260,10 @@ struct SquareRootUnscented {
     Matrix<n == dynamic ? dynamic : 2 * n + 1, m, S> seen(2 * ns + 1, ms);
     const auto h = [&](const X& x) -> Z { return sensor.predict(x); };
     const Z mean = spread(belief, h, seen);
-    array.topLeftCorner(2 * ns + 1, ms) = seen;
-    array.block(0, ms, ns, ns) = belief.root.transpose();
-    array.bottomLeftCorner(ms, ms) = detail::semi_definite_root<m, S>(r).transpose();
+    for (int j = 0; j < ms; ++j)
+      for (int i = 0; i <= 2 * ns; ++i) array(i, j) = seen(i, j);
+    detail::put_transposed(array, 0, ms, belief.root);
+    detail::put_transposed(array, 2 * ns + 1, 0, detail::semi_definite_root<m, S>(r));
     if (!detail::all_finite(r)) array(0, 0) = std::numeric_limits<S>::quiet_NaN();
     return detail::correct_by_array<X, m>(belief, array, local(mean, z), sound(ns) ? gate : 0.0);
   }
@@ -275,17 +286,24 @@ private:
     const Y center = f(belief.mean);
     Tangent<Y> mean = Tangent<Y>::Zero(dof_of(center));
     for (int i = 0; i < n; ++i) {
-      const Tangent<X> step = c * belief.root.col(i);
+      Tangent<X> step = c * belief.root.col(i);
       const Tangent<Y> up = local(center, Y(f(retract(belief.mean, step))));
-      const Tangent<Y> down = local(center, Y(f(retract(belief.mean, Tangent<X>(-step)))));
-      const Tangent<Y> odd = S(0.5) * (up - down);
-      Tangent<Y> even = S(0.5) * (up + down);
+      step = -step;
+      const Tangent<Y> down = local(center, Y(f(retract(belief.mean, step))));
+      Tangent<Y> odd = up, even = down;
+      for (int k = 0; k < static_cast<int>(mean.size()); ++k) {
+        odd(k) = S(0.5) * (up(k) - down(k));
+        even(k) = S(0.5) * (up(k) + down(k));
+      }
       detail::drop_noise<Y>(center, odd, even);
-      rows.row(i) = odd.transpose() / c;
-      rows.row(n + i) = even.transpose() / c;
-      mean += even / (c * c);
+      for (int k = 0; k < static_cast<int>(mean.size()); ++k) {
+        rows(i, k) = odd(k) / c;
+        rows(n + i, k) = even(k) / c;
+        mean(k) += even(k) / (c * c);
+      }
     }
-    rows.row(2 * n) = sqrt(static_cast<S>(points.beta - points.alpha * points.alpha)) * mean.transpose();
+    const S of_mean = sqrt(static_cast<S>(points.beta - points.alpha * points.alpha));
+    for (int k = 0; k < static_cast<int>(mean.size()); ++k) rows(2 * n, k) = of_mean * mean(k);
     return retract(center, mean);
   }
 };

@@ -9,6 +9,7 @@
 #pragma once
 
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/version.hpp>
 
@@ -26,9 +27,7 @@ struct LinearModel {
   Vector<N, S> offset = Vector<N, S>::Zero(N == dynamic ? 0 : N);  ///< may stay empty for run-time sizes
 
   [[nodiscard]] State propagate(const State& x, const Control&, double) const {
-    State next = transition * x;
-    if (offset.size() != 0) next += offset;
-    return next;
+    return detail::affine(transition, x, offset);
   }
   [[nodiscard]] const Matrix<N, N, S>& jacobian(const State&, const Control&, double) const {
     return transition;
@@ -71,11 +70,7 @@ struct LinearSensor {
   Matrix<M, M, S> covariance;
   Vector<M, S> offset = Vector<M, S>::Zero(M == dynamic ? 0 : M);  ///< may stay empty for run-time sizes
 
-  [[nodiscard]] Measurement predict(const State& x) const {
-    Measurement z = design * x;
-    if (offset.size() != 0) z += offset;
-    return z;
-  }
+  [[nodiscard]] Measurement predict(const State& x) const { return detail::affine(design, x, offset); }
   [[nodiscard]] const Matrix<M, N, S>& jacobian(const State&) const { return design; }
   [[nodiscard]] const Matrix<M, M, S>& noise(const State&) const { return covariance; }
 };
