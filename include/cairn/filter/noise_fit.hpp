@@ -19,6 +19,7 @@
 
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/kalman.hpp>
+#include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/smoother.hpp>
 #include <cairn/filter/status.hpp>
@@ -89,12 +90,17 @@ struct NoiseSums {
                 const RecordedStep<typename F::State>& step, const Gaussian<typename F::State>& before,
                 const Gaussian<typename F::State>& after) {
     using X = typename F::State;
+    using S = ScalarOf<X>;
+    constexpr int n = dof<X>;
     const CovarianceOf<X> jacobian = dense_of(f.jacobian(before.mean, u, dt));
     const Tangent<X> e = local(X(f.propagate(before.mean, u, dt)), after.mean);
-    const CovarianceOf<X> cross = after.covariance * smoother_gain(step).transpose();
-    const CovarianceOf<X> shared = cross * jacobian.transpose();
-    process += e * e.transpose() + after.covariance - shared - shared.transpose();
-    process += jacobian * before.covariance * jacobian.transpose();
+    const CovarianceOf<X> back = transposed<n, n, S>(jacobian);
+    const CovarianceOf<X> gain = transposed<n, n, S>(smoother_gain(step));
+    const CovarianceOf<X> shared = product(product(after.covariance, gain), back);
+    const CovarianceOf<X> spread = product(jacobian, product(before.covariance, back));
+    for (int j = 0; j < static_cast<int>(process.cols()); ++j)
+      for (int i = 0; i < static_cast<int>(process.rows()); ++i)
+        process(i, j) += e(i) * e(j) + after.covariance(i, j) - shared(i, j) - shared(j, i) + spread(i, j);
     ++steps;
   }
   void add_sighting(const H& h, const typename H::Measurement& z, const Gaussian<typename H::State>& belief) {

@@ -23,6 +23,7 @@
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kalman.hpp>
+#include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/sigma_points.hpp>
 #include <cairn/filter/status.hpp>
@@ -84,10 +85,13 @@ template <Manifold X>
 template <Manifold X>
 [[nodiscard]] Gaussian<X> smooth_back(const RecordedStep<X>& step, const Gaussian<X>& after) {
   const CovarianceOf<X> gain = detail::smoother_gain(step);
-  const Tangent<X> correction = gain * local(step.predicted.mean, after.mean);
+  constexpr int n = dof<X>;
+  const Tangent<X> correction = detail::product(gain, Tangent<X>(local(step.predicted.mean, after.mean)));
   const CovarianceOf<X> change = after.covariance - step.predicted.covariance;
   return {retract(step.before.mean, correction),
-          symmetrised(step.before.covariance + gain * change * gain.transpose())};
+          symmetrised(
+              step.before.covariance +
+              detail::product(gain, detail::product(change, detail::transposed<n, n, ScalarOf<X>>(gain))))};
 }
 
 /// Runs a filter and remembers what smoothing needs: one RecordedStep a prediction.

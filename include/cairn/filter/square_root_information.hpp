@@ -20,6 +20,7 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/information.hpp>
+#include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/square_root.hpp>
 #include <cairn/filter/status.hpp>
@@ -116,14 +117,20 @@ struct SquareRootInformationFilter {
     constexpr int width = n == dynamic ? dynamic : 2 * n + 1;
     Matrix<width, width, S> array = Matrix<width, width, S>::Zero(2 * size + 1, 2 * size + 1);
     const CovarianceOf<X> moved_root = detail::transposed<n, n, S>(moved);
-    array.topLeftCorner(size, size).setIdentity();
-    array.block(size, 0, size, size) = -moved_root * detail::semi_definite_root<n, S>(q);
-    array.block(size, size, size, size) = moved_root;
-    for (int i = 0; i < size; ++i)  // one by one: gcc 12 warns wrongly of a block's end
-      array(size + i, 2 * size) = next.vector(i) / faded;
+    const CovarianceOf<X> of_noise = detail::product(moved_root, detail::semi_definite_root<n, S>(q));
+    for (int j = 0; j < size; ++j) {  // one by one: gcc 12 warns wrongly of a block's end
+      array(j, j) = S(1);
+      array(size + j, 2 * size) = next.vector(j) / faded;
+      for (int i = 0; i < size; ++i) {
+        array(size + i, j) = -of_noise(i, j);
+        array(size + i, size + j) = moved_root(i, j);
+      }
+    }
     detail::triangularise(array);
-    next.root = array.block(size, size, size, size);
-    for (int i = 0; i < size; ++i) next.vector(i) = array(size + i, 2 * size);
+    for (int j = 0; j < size; ++j) {
+      next.vector(j) = array(size + j, 2 * size);
+      for (int i = 0; i < size; ++i) next.root(i, j) = array(size + i, size + j);
+    }
     next.point = process.propagate(next.point, control, dt);
     return keep(belief, next);
   }
@@ -151,20 +158,25 @@ struct SquareRootInformationFilter {
     if (!detail::all_finite(v) || !detail::all_finite(h)) return Status::not_finite;
     constexpr int rows = detail::size_sum<n, m>;
     Matrix<rows, detail::size_sum<n, 1>, S> array(ns + ms, ns + 1);
-    array.topLeftCorner(ns, ns) = belief.root;
-    array.topRightCorner(ns, 1) = belief.vector;
+    for (int i = 0; i < ns; ++i) {
+      for (int j = 0; j < ns; ++j) array(i, j) = belief.root(i, j);
+      array(i, ns) = belief.vector(i);
+    }
     const Matrix<m, m, S> lower = detail::semi_definite_root<m, S>(v);
     for (int i = 0; i < ms; ++i) {  // V^-1/2 times (H, residual), row by row
       if (!(lower(i, i) > S(0))) return Status::not_positive_definite;
-      array.block(ns + i, 0, 1, ns) = h.row(i);
-      array(ns + i, ns) = residual(i);
-      for (int k = 0; k < i; ++k) array.row(ns + i) -= lower(i, k) * array.row(ns + k);
-      array.row(ns + i) /= lower(i, i);
+      for (int j = 0; j <= ns; ++j) {
+        S entry = j < ns ? h(i, j) : residual(i);
+        for (int k = 0; k < i; ++k) entry -= lower(i, k) * array(ns + k, j);
+        array(ns + i, j) = entry / lower(i, i);
+      }
     }
     detail::triangularise(array);
     SquareRootInformation<X> next = belief;
-    next.root = array.topLeftCorner(ns, ns);
-    next.vector = array.topRightCorner(ns, 1);
+    for (int i = 0; i < ns; ++i) {
+      for (int j = 0; j < ns; ++j) next.root(i, j) = array(i, j);
+      next.vector(i) = array(i, ns);
+    }
     return keep(belief, next);
   }
 

@@ -53,12 +53,22 @@ template <Manifold X, int M, class S>
   out.covariance_to(belief.covariance);
 }
 
-/// The same for any sizes, from matrices.
+/// The same from matrices.
 template <Manifold X, int M, class S>
 void correct_by_moments(Gaussian<X>& belief, const Matrix<dof<X>, M, S>& cross, Innovation<M, S>& in,
                         double gate) {
-  const int m = static_cast<int>(in.residual.size());
+  constexpr int n = dof<X>;
   in.covariance = symmetrised(in.covariance);
+  Column<n, S> columns[M];
+  for (int j = 0; j < M; ++j) columns[j].load(cross.data() + j * n);
+  correct_by_moments<X, M, S>(belief, columns, in, gate);
+}
+template <Manifold X, int M, class S>
+  requires(dof<X> == dynamic || M == dynamic)
+void correct_by_moments(Gaussian<X>& belief, const Matrix<dof<X>, M, S>& cross, Innovation<M, S>& in,
+                        double gate) {
+  in.covariance = symmetrised(in.covariance);
+  const int m = static_cast<int>(in.residual.size());
   Matrix<M, M, S> lower = in.covariance;
   const bool regular = checked_root<M, S>(in.covariance, lower) && (lower.diagonal().array() > S(0)).all();
   Matrix<dof<X>, M, S> w = cross;
