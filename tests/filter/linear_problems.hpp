@@ -69,9 +69,10 @@ struct LineFit {
   [[nodiscard]] cairn::Vector<1> height(int i) const { return cairn::Vector<1>(heights(i)); }
 };
 
-/// Largest entry of |a - b|; infinity where one is no number.
+/// Largest entry of |a - b|; infinity where one is no number or the sizes differ.
 template <class A, class B>
 double largest_difference(const A& a, const B& b) {
+  if (a.rows() != b.rows() || a.cols() != b.cols()) return std::numeric_limits<double>::infinity();
   double largest = 0.0;
   for (Eigen::Index j = 0; j < a.cols(); ++j)
     for (Eigen::Index i = 0; i < a.rows(); ++i) {

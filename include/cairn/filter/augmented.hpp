@@ -66,7 +66,7 @@ struct PointPairs {
   [[nodiscard]] Y mean() const { return retract(center, shift); }
 
   /// w (sum of odd odd^T + even even^T of both) + extra shift shift^T: covariance with other pairs that went
-  /// through another function. O(rows of both, columns).
+  /// through another function. O(rows of one * of the other * columns).
   template <Manifold Z>
   [[nodiscard]] Matrix<dof<Y>, dof<Z>, S> moment(const PointPairs<Z, K>& other, const S& w,
                                                  const S& extra) const {

@@ -85,18 +85,15 @@ template <int N, int M, class S, class H>
     gain[j].scale(c.inverse_root[j]);
     for (int i = j + 1; i < M; ++i) gain[j].subtract(gain[i], c.lower[i][j]);
   }
-  const Matrix<M, N, S> rows = dense_of(h);
   Matrix<N, M, S> k;
-  Matrix<N, N, S> a, zero;
   for (int j = 0; j < M; ++j) gain[j].store(k.data() + j * N);
-  for (int j = 0; j < N; ++j) {
-    Column<N, S> column;
-    column.set_zero();
-    column.store(zero.data() + j * N);
-    for (int m = 0; m < M; ++m) column.subtract(gain[m], rows(m, j));
-    column.store(a.data() + j * N);
-    a(j, j) += S(1);
-  }
+  Matrix<N, N, S> a = product(k, Matrix<M, N, S>(dense_of(h)));
+  Matrix<N, N, S> zero;
+  for (int j = 0; j < N; ++j)
+    for (int i = 0; i < N; ++i) {
+      a(i, j) = S(i == j ? 1 : 0) - a(i, j);
+      zero(i, j) = S(0);
+    }
   return congruence(a, p, congruence(k, r, zero));
 }
 

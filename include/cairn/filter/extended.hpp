@@ -137,10 +137,10 @@ Status Extended::iterate(Gaussian<typename H::State>& belief, const H& sensor,
   if (!detail::all_finite(e) || !detail::finite_state(belief.mean)) return Status::not_finite;
   if constexpr (!detail::is_vector<X>) {
     const CovarianceOf<X> transport = detail::transport(belief.mean, e);
-    covariance = symmetrised(transport * covariance * transport.transpose());
+    covariance = (transport * covariance * transport.transpose()).eval();
   }
   belief.mean = retract(belief.mean, e);
-  belief.covariance = covariance;
+  belief.covariance = symmetrised(covariance);
   return Status::accepted;
 }
 

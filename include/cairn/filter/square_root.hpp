@@ -230,8 +230,9 @@ struct SquareRootUnscented {
     Matrix<rows, n, S> array(3 * size + 1, size);
     const auto f = [&](const X& x) -> X { return process.propagate(x, control, dt); };
     const X mean = spread(belief, f, array);
+    const S faded = sqrt(static_cast<S>(fading));
     for (int j = 0; j < size; ++j)
-      for (int i = 0; i <= 2 * size && fading != 1.0; ++i) array(i, j) *= sqrt(static_cast<S>(fading));
+      for (int i = 0; i <= 2 * size; ++i) array(i, j) *= faded;
     detail::put_transposed(array, 2 * size + 1, 0, detail::semi_definite_root<n, S>(q));
     detail::triangularise(array);
     return detail::keep_root(belief, mean, array, size);
