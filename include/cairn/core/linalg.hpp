@@ -38,17 +38,81 @@ template <class Derived>
   return result;
 }
 
-/// to += weight a^T b. Plain loops: an expression of Eigen's of more than 8 rows takes its general product,
-/// which costs half a second of compiling for every shape. O(R C K).
+namespace detail {
+
+/// The R x C matrix whose entries are sums of term(r, k, c) over k below K.
+template <int R, int K, int C, class S, class Term>
+[[nodiscard, gnu::always_inline]] inline Matrix<R, C, S> sums(const Term& term) {
+  Matrix<R, C, S> result;
+#pragma GCC unroll 8
+  for (int c = 0; c < C; ++c)
+#pragma GCC unroll 8
+    for (int r = 0; r < R; ++r) {
+      S sum = term(r, 0, c);
+#pragma GCC unroll 8
+      for (int k = 1; k < K; ++k) sum += term(r, k, c);
+      result(r, c) = sum;
+    }
+  return result;
+}
+
+}  // namespace detail
+
+/// A B. This and the three below are plain loops, which the compiler unrolls where sizes are small: each
+/// shape of a product of Eigen's costs whoever includes it a tenth of a second of compiling, called or not,
+/// and of more than 8 rows half a second. Run-time sizes go through Eigen, whose blocks pay there. O(R K C).
+template <int R, int K, int C, class S>
+[[nodiscard]] Matrix<R, C, S> product(const Matrix<R, K, S>& a, const Matrix<K, C, S>& b) {
+  if constexpr (R == dynamic || K == dynamic || C == dynamic)
+    return a * b;
+  else
+    return detail::sums<R, K, C, S>([&](int r, int k, int c) { return a(r, k) * b(k, c); });
+}
+
+/// A^T B, see product().
+template <int R, int K, int C, class S>
+[[nodiscard]] Matrix<R, C, S> transposed_product(const Matrix<K, R, S>& a, const Matrix<K, C, S>& b) {
+  if constexpr (R == dynamic || K == dynamic || C == dynamic)
+    return a.transpose() * b;
+  else
+    return detail::sums<R, K, C, S>([&](int r, int k, int c) { return a(k, r) * b(k, c); });
+}
+
+/// A B^T, see product().
+template <int R, int K, int C, class S>
+[[nodiscard]] Matrix<R, C, S> product_transposed(const Matrix<R, K, S>& a, const Matrix<C, K, S>& b) {
+  if constexpr (R == dynamic || K == dynamic || C == dynamic)
+    return a * b.transpose();
+  else
+    return detail::sums<R, K, C, S>([&](int r, int k, int c) { return a(r, k) * b(c, k); });
+}
+
+/// to += weight A^T B, see product().
 template <int R, int C, int K, class S>
 void add_transposed_product(Matrix<R, C, S>& to, const Matrix<K, R, S>& a, const Matrix<K, C, S>& b,
                             S weight = S(1)) {
+  const Matrix<R, C, S> sum = transposed_product(a, b);
   for (int c = 0; c < C; ++c)
-    for (int r = 0; r < R; ++r) {
-      S sum(0);
-      for (int k = 0; k < K; ++k) sum += a(k, r) * b(k, c);
-      to(r, c) += weight * sum;
-    }
+    for (int r = 0; r < R; ++r) to(r, c) += weight * sum(r, c);
+}
+
+/// A^T, entry by entry: gcc 12 calls a matrix that is constructed from an Eigen transpose uninitialised.
+template <int R, int C, class S>
+[[nodiscard]] Matrix<C, R, S> transposed(const Matrix<R, C, S>& a) {
+  Matrix<C, R, S> result(a.cols(), a.rows());
+  for (Eigen::Index j = 0; j < a.cols(); ++j)
+    for (Eigen::Index i = 0; i < a.rows(); ++i) result(j, i) = a(i, j);
+  return result;
+}
+
+/// Whether every number is finite.
+template <class Derived>
+[[nodiscard]] bool all_finite(const Eigen::DenseBase<Derived>& a) {
+  using S = typename Derived::Scalar;
+  S zero(0);
+  for (Eigen::Index j = 0; j < a.cols(); ++j)
+    for (Eigen::Index i = 0; i < a.rows(); ++i) zero += a.derived().coeff(i, j) - a.derived().coeff(i, j);
+  return zero == S(0);
 }
 
 /// Skew-symmetric matrix of w: skew(w) * v = w x v.

@@ -206,13 +206,13 @@ private:
   template <Manifold X, Manifold V>
   static Status roots(const CovarianceOf<X>& p, CovarianceOf<X>& root_p, const CovarianceOf<V>& r,
                       CovarianceOf<V>& root_r) {
-    if (!detail::all_finite(p)) return Status::not_finite;
+    if (!all_finite(p)) return Status::not_finite;
     if (!detail::checked_root<dof<X>, ScalarOf<X>>(p, root_p)) return Status::not_positive_definite;
     return noise_root<V>(r, root_r);
   }
   template <Manifold V>
   static Status noise_root(const CovarianceOf<V>& r, CovarianceOf<V>& root) {
-    if (!detail::all_finite(r)) return Status::not_finite;
+    if (!all_finite(r)) return Status::not_finite;
     const CovarianceOf<V> symmetric = symmetrised(r);
     return detail::checked_root<dof<V>, ScalarOf<V>>(symmetric, root) ? Status::accepted
                                                                       : Status::not_positive_definite;
@@ -264,7 +264,7 @@ private:
     for (int i = 0; i < static_cast<int>(covariance.rows()); ++i)
       covariance(i, i) += static_cast<S>(stabilising_noise);
     const X mean = pairs.mean();
-    if (!detail::all_finite(covariance) || !detail::finite_state(mean)) return Status::not_finite;
+    if (!all_finite(covariance) || !detail::finite_state(mean)) return Status::not_finite;
     if (!detail::is_valid_covariance<dof<X>, S>(covariance)) return Status::not_positive_definite;
     belief.mean = mean;
     belief.covariance = covariance;

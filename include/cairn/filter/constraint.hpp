@@ -24,8 +24,7 @@ Status constrain(Gaussian<X>& belief, const Matrix<K, dof<X>, ScalarOf<X>>& d,
   using S = ScalarOf<X>;
   constexpr int n = dof<X>;
   if (d.cols() != belief.covariance.rows() || d.rows() != c.size()) return Status::size_mismatch;
-  if (!detail::all_finite(d) || !detail::all_finite(c) || !detail::all_finite(belief.covariance))
-    return Status::not_finite;
+  if (!all_finite(d) || !all_finite(c) || !all_finite(belief.covariance)) return Status::not_finite;
   const Matrix<n, K, S> pd = belief.covariance * d.transpose();
   const Matrix<K, K, S> s = symmetrised(d * pd);
   const Cholesky<K, S> root(s);
@@ -35,7 +34,7 @@ Status constrain(Gaussian<X>& belief, const Matrix<K, dof<X>, ScalarOf<X>>& d,
   for (int i = 0; i < static_cast<int>(next.rows());
        ++i)  // what is now known exactly must not round below zero
     if (next(i, i) < S(0)) next(i, i) = S(0);
-  if (!detail::all_finite(step) || !detail::all_finite(next)) return Status::not_positive_definite;
+  if (!all_finite(step) || !all_finite(next)) return Status::not_positive_definite;
   belief.mean = retract(belief.mean, step);
   belief.covariance = next;
   return Status::accepted;

@@ -87,7 +87,7 @@ template <int N, int M, class S, class H>
   }
   Matrix<N, M, S> k;
   for (int j = 0; j < M; ++j) gain[j].store(k.data() + j * N);
-  Matrix<N, N, S> a = product(k, Matrix<M, N, S>(dense_of(h)));
+  Matrix<N, N, S> a = column_product(k, Matrix<M, N, S>(dense_of(h)));
   Matrix<N, N, S> zero;
   for (int j = 0; j < N; ++j)
     for (int i = 0; i < N; ++i) {

@@ -96,7 +96,7 @@ struct EnsembleKalman {
     for (const X& x : belief.members) {
       const CovarianceOf<W> q = process.noise(x, control, dt);
       CovarianceOf<W> root = q;
-      if (!detail::all_finite(q)) return Status::not_finite;
+      if (!all_finite(q)) return Status::not_finite;
       if (!detail::checked_root<dof<W>, S>(q, root)) return Status::not_positive_definite;
       next.members.push_back(detail::driven(process, x, control, draw<W>(root, random), dt));
       if (!detail::finite_state(next.members.back())) return Status::not_finite;
@@ -137,7 +137,7 @@ struct EnsembleKalman {
     in.status = judge<m, S>(in, r, root);
     if (in.status != Status::accepted) return in;
     const Tangent<X> shift = assimilate<dof<X>, m, S>(apart, views, root, in.residual, random);
-    if (!detail::all_finite(apart) || !detail::all_finite(shift)) {
+    if (!all_finite(apart) || !all_finite(shift)) {
       in.status = Status::not_finite;
       return in;
     }
@@ -163,7 +163,7 @@ private:
 
   template <int M, class S>
   Status judge(const Innovation<M, S>& in, const Matrix<M, M, S>& r, Matrix<M, M, S>& root) const {
-    if (!detail::all_finite(in.residual) || !detail::all_finite(in.covariance) || !detail::all_finite(r))
+    if (!all_finite(in.residual) || !all_finite(in.covariance) || !all_finite(r))
       return Status::not_finite;
     if (!detail::checked_root<M, S>(r, root) || !(root.diagonal().array() > S(0)).all())
       return Status::not_positive_definite;

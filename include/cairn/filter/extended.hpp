@@ -134,7 +134,7 @@ Status Extended::iterate(Gaussian<typename H::State>& belief, const H& sensor,
     const S size = detail::squared_mahalanobis<n, S>(change, belief.covariance);
     if (size <= static_cast<S>(tolerance * tolerance)) break;
   }
-  if (!detail::all_finite(e) || !detail::finite_state(belief.mean)) return Status::not_finite;
+  if (!all_finite(e) || !detail::finite_state(belief.mean)) return Status::not_finite;
   if constexpr (!detail::is_vector<X>) {
     const CovarianceOf<X> transport = detail::transport(belief.mean, e);
     covariance = (transport * covariance * transport.transpose()).eval();

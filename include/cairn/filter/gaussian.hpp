@@ -42,24 +42,6 @@ template <class S>
   return value - value == S(0);
 }
 
-template <class Derived>
-[[nodiscard]] inline bool all_finite(const Eigen::DenseBase<Derived>& a) {
-  using S = typename Derived::Scalar;
-  S zero(0);
-  for (Eigen::Index j = 0; j < a.cols(); ++j)
-    for (Eigen::Index i = 0; i < a.rows(); ++i) zero += a.derived().coeff(i, j) - a.derived().coeff(i, j);
-  return zero == S(0);
-}
-
-/// a^T, entry by entry: gcc 12 calls a matrix that is constructed from an Eigen transpose uninitialised.
-template <int R, int C, class S>
-[[nodiscard]] Matrix<C, R, S> transposed(const Matrix<R, C, S>& a) {
-  Matrix<C, R, S> result(a.cols(), a.rows());
-  for (Eigen::Index j = 0; j < a.cols(); ++j)
-    for (Eigen::Index i = 0; i < a.rows(); ++i) result(j, i) = a(i, j);
-  return result;
-}
-
 template <class X>
 inline constexpr bool is_vector = false;
 template <class S, int N, int O, int MR, int MC>

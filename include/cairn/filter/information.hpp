@@ -52,7 +52,7 @@ struct InformationBelief {
     const Cholesky<dof<X>, ScalarOf<X>> root(information);
     if (!root.good()) return std::nullopt;
     Gaussian<X> result{retract(point, root.solve(vector)), root.inverse()};
-    if (!detail::all_finite(result.covariance) || !detail::finite_state(result.mean)) return std::nullopt;
+    if (!all_finite(result.covariance) || !detail::finite_state(result.mean)) return std::nullopt;
     return result;
   }
 };
@@ -114,20 +114,21 @@ struct InformationFilter {
     if (!(fading >= 1.0) || !(stabilising_noise >= 0.0)) return Status::bad_option;
     for (int i = 0; i < size; ++i) q(i, i) += static_cast<S>(stabilising_noise);
     const CovarianceOf<X> g = detail::semi_definite_root<n, S>(q);
-    if (!detail::all_finite(f) || !detail::all_finite(q)) return Status::not_finite;
+    if (!all_finite(f) || !all_finite(q)) return Status::not_finite;
     if (!detail::solve_square<n, n, S>(f, inverse)) return Status::not_positive_definite;
-    const CovarianceOf<X> back = detail::transposed<n, n, S>(inverse) / static_cast<S>(fading);
-    const CovarianceOf<X> m = symmetrised(detail::product(back, detail::product(next.information, inverse)));
-    const Tangent<X> y = detail::product(back, next.vector);
-    const CovarianceOf<X> gt = detail::transposed<n, n, S>(g);
-    const CovarianceOf<X> mg = detail::product(m, g);
-    CovarianceOf<X> inner = detail::product(gt, mg);
+    const CovarianceOf<X> back = transposed<n, n, S>(inverse) / static_cast<S>(fading);
+    const CovarianceOf<X> m =
+        symmetrised(detail::column_product(back, detail::column_product(next.information, inverse)));
+    const Tangent<X> y = detail::column_product(back, next.vector);
+    const CovarianceOf<X> gt = transposed<n, n, S>(g);
+    const CovarianceOf<X> mg = detail::column_product(m, g);
+    CovarianceOf<X> inner = detail::column_product(gt, mg);
     for (int i = 0; i < size; ++i) inner(i, i) += S(1);
     const Cholesky<n, S> root(inner);
     if (!root.good()) return Status::not_positive_definite;
-    const CovarianceOf<X> lost = detail::product(mg, root.solve(detail::transposed<n, n, S>(mg)));
+    const CovarianceOf<X> lost = detail::column_product(mg, root.solve(transposed<n, n, S>(mg)));
     next.information = symmetrised(m - lost);
-    next.vector = y - detail::product(mg, root.solve(detail::product(gt, y)));
+    next.vector = y - detail::column_product(mg, root.solve(detail::column_product(gt, y)));
     next.point = process.propagate(next.point, control, dt);
     return keep(belief, next);
   }
@@ -150,8 +151,8 @@ struct InformationFilter {
     const Vector<m, S> residual = local(Z(sensor.predict(belief.point)), z);
     if (h.cols() != belief.vector.size() || h.rows() != residual.size()) return Status::size_mismatch;
     const Cholesky<m, S> root(r);
-    if (!root.good() || !detail::all_finite(r))
-      return detail::all_finite(r) ? Status::not_positive_definite : Status::not_finite;
+    if (!root.good() || !all_finite(r))
+      return all_finite(r) ? Status::not_positive_definite : Status::not_finite;
     const Matrix<m, dof<X>, S> white = root.whiten(h);
     InformationBelief<X> next = belief;
     add_transposed_product(next.information, white, white);
@@ -165,7 +166,7 @@ struct InformationFilter {
     const Cholesky<dof<X>, ScalarOf<X>> root(belief.information);
     if (!root.good()) return false;
     const Tangent<X> d = root.solve(belief.vector);
-    if (!detail::all_finite(d)) return false;
+    if (!all_finite(d)) return false;
     belief.point = retract(belief.point, d);
     belief.vector.setZero();
     return true;
@@ -174,8 +175,7 @@ struct InformationFilter {
 private:
   template <Manifold X>
   static Status keep(InformationBelief<X>& belief, const InformationBelief<X>& next) {
-    if (!detail::all_finite(next.information) || !detail::all_finite(next.vector) ||
-        !detail::finite_state(next.point))
+    if (!all_finite(next.information) || !all_finite(next.vector) || !detail::finite_state(next.point))
       return Status::not_finite;
     if (!detail::is_valid_covariance<dof<X>, ScalarOf<X>>(symmetrised(next.information)))
       return Status::not_positive_definite;

@@ -145,7 +145,7 @@ private:
       x = retract(x, Tangent<X>(h / S(6) * (k1.state + S(2) * (k2.state + k3.state) + k4.state)));
       p = symmetrised(p + h / S(6) * (k1.matrix + S(2) * (k2.matrix + k3.matrix) + k4.matrix));
     }
-    if (!detail::all_finite(p) || !detail::finite_state(x)) return Status::not_finite;
+    if (!all_finite(p) || !detail::finite_state(x)) return Status::not_finite;
     if (!detail::is_valid_covariance<dof<X>, S>(p)) return Status::not_positive_definite;
     state = x;
     matrix = p;

@@ -209,10 +209,9 @@ template <int R, int C, class S>
   }
 }
 
-/// A B. A product of Eigen's, which run-time sizes take, costs a tenth of a second of compiling for each
-/// shape.
+/// cairn::product() for matrices of states, column by column in registers.
 template <int R, int C, int K, class S>
-[[nodiscard]] Matrix<R, K, S> product(const Matrix<R, C, S>& a, const Matrix<C, K, S>& b) {
+[[nodiscard]] Matrix<R, K, S> column_product(const Matrix<R, C, S>& a, const Matrix<C, K, S>& b) {
   if constexpr (R == dynamic || C == dynamic || K == dynamic) {
     return a * b;
   } else {

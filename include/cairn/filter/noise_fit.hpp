@@ -96,8 +96,8 @@ struct NoiseSums {
     const Tangent<X> e = local(X(f.propagate(before.mean, u, dt)), after.mean);
     const CovarianceOf<X> back = transposed<n, n, S>(jacobian);
     const CovarianceOf<X> gain = transposed<n, n, S>(smoother_gain(step));
-    const CovarianceOf<X> shared = product(product(after.covariance, gain), back);
-    const CovarianceOf<X> spread = product(jacobian, product(before.covariance, back));
+    const CovarianceOf<X> shared = column_product(column_product(after.covariance, gain), back);
+    const CovarianceOf<X> spread = column_product(jacobian, column_product(before.covariance, back));
     for (int j = 0; j < static_cast<int>(process.cols()); ++j)
       for (int i = 0; i < static_cast<int>(process.rows()); ++i)
         process(i, j) += e(i) * e(j) + after.covariance(i, j) - shared(i, j) - shared(j, i) + spread(i, j);

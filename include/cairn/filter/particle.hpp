@@ -249,7 +249,7 @@ struct ParticleFilter {
     for (const X& x : belief.states) {
       const CovarianceOf<X> q = process.noise(x, control, dt);
       if (!detail::is_valid_covariance<dof<X>, ScalarOf<X>>(q))
-        return detail::all_finite(q) ? Status::not_positive_definite : Status::not_finite;
+        return all_finite(q) ? Status::not_positive_definite : Status::not_finite;
       next.push_back(sample(Gaussian<X>{process.propagate(x, control, dt), q}, random));
       if (!detail::finite_state(next.back())) return Status::not_finite;
     }

@@ -185,7 +185,7 @@ template <int M, class S>
   CAIRN_EXPECTS(rate > 0.0 && rate < 1.0, "innovated_noise needs a rate between 0 and 1");
   const Matrix<M, M, S> change =
       innovation.residual * innovation.residual.transpose() - innovation.covariance;
-  if (!detail::all_finite(change)) return r;
+  if (!all_finite(change)) return r;
   for (S part = static_cast<S>(rate); part > S(1e-6) * static_cast<S>(rate); part *= S(0.5)) {
     const Matrix<M, M, S> next = symmetrised(r + part * change);
     if (detail::is_valid_covariance<M, S>(next - S(0.5) * r)) return next;

@@ -86,12 +86,13 @@ template <Manifold X>
 [[nodiscard]] Gaussian<X> smooth_back(const RecordedStep<X>& step, const Gaussian<X>& after) {
   const CovarianceOf<X> gain = detail::smoother_gain(step);
   constexpr int n = dof<X>;
-  const Tangent<X> correction = detail::product(gain, Tangent<X>(local(step.predicted.mean, after.mean)));
+  const Tangent<X> correction =
+      detail::column_product(gain, Tangent<X>(local(step.predicted.mean, after.mean)));
   const CovarianceOf<X> change = after.covariance - step.predicted.covariance;
   return {retract(step.before.mean, correction),
-          symmetrised(
-              step.before.covariance +
-              detail::product(gain, detail::product(change, detail::transposed<n, n, ScalarOf<X>>(gain))))};
+          symmetrised(step.before.covariance +
+                      detail::column_product(
+                          gain, detail::column_product(change, transposed<n, n, ScalarOf<X>>(gain))))};
 }
 
 /// Runs a filter and remembers what smoothing needs: one RecordedStep a prediction.

@@ -163,7 +163,7 @@ struct SquareRoot {
     const Status status = detail::stabilise<X>(q, fading, stabilising_noise);
     if (status != Status::accepted) return status;
     Matrix<detail::size_sum<n, n>, n, S> array(2 * size, size);
-    CovarianceOf<X> moved = detail::product(f, belief.root);
+    CovarianceOf<X> moved = detail::column_product(f, belief.root);
     if (fading != 1.0) moved *= sqrt(static_cast<S>(fading));
     detail::put_transposed(array, 0, 0, moved);
     detail::put_transposed(array, size, 0, detail::semi_definite_root<n, S>(q));
@@ -198,9 +198,9 @@ struct SquareRoot {
     Matrix<detail::size_sum<m, n>, detail::size_sum<m, n>, S> array(ms + ns, ms + ns);
     array.setZero();
     detail::put_transposed(array, 0, 0, detail::semi_definite_root<m, S>(r));
-    detail::put_transposed(array, ms, 0, detail::product(h, belief.root));
+    detail::put_transposed(array, ms, 0, detail::column_product(h, belief.root));
     detail::put_transposed(array, ms, ms, belief.root);
-    if (!detail::all_finite(r)) array(0, 0) = std::numeric_limits<S>::quiet_NaN();
+    if (!all_finite(r)) array(0, 0) = std::numeric_limits<S>::quiet_NaN();
     return detail::correct_by_array<X, m>(belief, array, residual, gate);
   }
 };
@@ -265,7 +265,7 @@ struct SquareRootUnscented {
       for (int i = 0; i <= 2 * ns; ++i) array(i, j) = seen(i, j);
     detail::put_transposed(array, 0, ms, belief.root);
     detail::put_transposed(array, 2 * ns + 1, 0, detail::semi_definite_root<m, S>(r));
-    if (!detail::all_finite(r)) array(0, 0) = std::numeric_limits<S>::quiet_NaN();
+    if (!all_finite(r)) array(0, 0) = std::numeric_limits<S>::quiet_NaN();
     return detail::correct_by_array<X, m>(belief, array, local(mean, z), sound(ns) ? gate : 0.0);
   }
 

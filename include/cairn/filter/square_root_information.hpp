@@ -80,7 +80,7 @@ struct SquareRootInformation {
         !detail::solve_upper<dof<X>, 1, ScalarOf<X>>(root, d))
       return std::nullopt;
     Gaussian<X> result{retract(point, d), symmetrised(inverse * inverse.transpose())};
-    if (!detail::all_finite(result.covariance) || !detail::finite_state(result.mean)) return std::nullopt;
+    if (!all_finite(result.covariance) || !detail::finite_state(result.mean)) return std::nullopt;
     return result;
   }
 };
@@ -106,18 +106,17 @@ struct SquareRootInformationFilter {
     CovarianceOf<X> f = detail::dense_of(process.jacobian(next.point, control, dt));
     CovarianceOf<X> q = process.noise(next.point, control, dt);
     if (f.rows() != size || f.cols() != size || q.rows() != size) return Status::size_mismatch;
-    if (!detail::all_finite(f)) return Status::not_finite;
+    if (!all_finite(f)) return Status::not_finite;
     const Status status = detail::stabilise<X>(q, fading, stabilising_noise);
     if (status != Status::accepted) return status;
     const S faded = sqrt(static_cast<S>(fading));
     f *= faded;
-    CovarianceOf<X> moved = detail::transposed<n, n, S>(next.root);  // (R F^-1)^T solves F^T y = R^T
-    if (!detail::solve_square<n, n, S>(detail::transposed<n, n, S>(f), moved))
-      return Status::not_positive_definite;
+    CovarianceOf<X> moved = transposed<n, n, S>(next.root);  // (R F^-1)^T solves F^T y = R^T
+    if (!detail::solve_square<n, n, S>(transposed<n, n, S>(f), moved)) return Status::not_positive_definite;
     constexpr int width = n == dynamic ? dynamic : 2 * n + 1;
     Matrix<width, width, S> array = Matrix<width, width, S>::Zero(2 * size + 1, 2 * size + 1);
-    const CovarianceOf<X> moved_root = detail::transposed<n, n, S>(moved);
-    const CovarianceOf<X> of_noise = detail::product(moved_root, detail::semi_definite_root<n, S>(q));
+    const CovarianceOf<X> moved_root = transposed<n, n, S>(moved);
+    const CovarianceOf<X> of_noise = detail::column_product(moved_root, detail::semi_definite_root<n, S>(q));
     for (int j = 0; j < size; ++j) {  // one by one: gcc 12 warns wrongly of a block's end
       array(j, j) = S(1);
       array(size + j, 2 * size) = next.vector(j) / faded;
@@ -155,7 +154,7 @@ struct SquareRootInformationFilter {
     const int ns = static_cast<int>(belief.vector.size());
     const int ms = static_cast<int>(residual.size());
     if (h.cols() != ns || h.rows() != ms || v.rows() != ms) return Status::size_mismatch;
-    if (!detail::all_finite(v) || !detail::all_finite(h)) return Status::not_finite;
+    if (!all_finite(v) || !all_finite(h)) return Status::not_finite;
     constexpr int rows = detail::size_sum<n, m>;
     Matrix<rows, detail::size_sum<n, 1>, S> array(ns + ms, ns + 1);
     for (int i = 0; i < ns; ++i) {
@@ -184,7 +183,7 @@ struct SquareRootInformationFilter {
   template <Manifold X>
   static bool recentre(SquareRootInformation<X>& belief) {
     Tangent<X> d = belief.vector;
-    if (!detail::solve_upper<dof<X>, 1, ScalarOf<X>>(belief.root, d) || !detail::all_finite(d)) return false;
+    if (!detail::solve_upper<dof<X>, 1, ScalarOf<X>>(belief.root, d) || !all_finite(d)) return false;
     belief.point = retract(belief.point, d);
     belief.vector.setZero();
     return true;
@@ -193,8 +192,7 @@ struct SquareRootInformationFilter {
 private:
   template <Manifold X>
   static Status keep(SquareRootInformation<X>& belief, const SquareRootInformation<X>& next) {
-    if (!detail::all_finite(next.root) || !detail::all_finite(next.vector) ||
-        !detail::finite_state(next.point))
+    if (!all_finite(next.root) || !all_finite(next.vector) || !detail::finite_state(next.point))
       return Status::not_finite;
     belief = next;
     return Status::accepted;

@@ -40,7 +40,7 @@ template <int N, int M, class S>
   const Cholesky<M, S> root_r(r);
   if (!root_r.good()) return std::nullopt;
   const Matrix<N, N, S> identity = Matrix<N, N, S>::Identity(n, n);
-  Matrix<N, N, S> a = detail::transposed<N, N, S>(f);   // transition of the adjoint, 2^k steps
+  Matrix<N, N, S> a = transposed<N, N, S>(f);           // transition of the adjoint, 2^k steps
   Matrix<N, N, S> g = h.transpose() * root_r.solve(h);  // information of 2^k measurements
   Matrix<N, N, S> p = q;                                // covariance after 2^k steps from certainty
   bool settled = false;
@@ -54,7 +54,7 @@ template <int N, int M, class S>
     g = symmetrised(g + a * inverse_g * a.transpose());
     a = (a * inverse_a).eval();
     p += growth;
-    if (!detail::all_finite(p) || !detail::all_finite(g)) return std::nullopt;
+    if (!all_finite(p) || !all_finite(g)) return std::nullopt;
     settled =
         growth.cwiseAbs().maxCoeff() <= S(4) * std::numeric_limits<S>::epsilon() * p.cwiseAbs().maxCoeff();
   }

@@ -180,7 +180,7 @@ private:
     Vector<M, S> d_r = Vector<M, S>::Zero();
     Vector<M, S> left = in.residual;
     if (!detail::ud_factor<M, S>(r, upper_r, d_r)) {
-      in.status = detail::all_finite(r) ? Status::not_positive_definite : Status::not_finite;
+      in.status = all_finite(r) ? Status::not_positive_definite : Status::not_finite;
       return false;
     }
     for (int j = M - 1; j >= 0; --j)
@@ -206,7 +206,7 @@ private:
       });
       if (good) [[likely]]
         return Status::accepted;
-      return detail::all_finite(q.dense()) ? Status::not_positive_definite : Status::not_finite;
+      return all_finite(q.dense()) ? Status::not_positive_definite : Status::not_finite;
     } else if constexpr (detail::is_diagonal<Q>) {
       bool finite = true, positive = true;
       detail::each<N>([&](int j) {
@@ -224,7 +224,7 @@ private:
       Matrix<N, N, S> upper;
       Vector<N, S> diagonal = Vector<N, S>::Zero();
       if (!detail::ud_factor<N, S>(dense, upper, diagonal))
-        return detail::all_finite(dense) ? Status::not_positive_definite : Status::not_finite;
+        return all_finite(dense) ? Status::not_positive_definite : Status::not_finite;
       detail::each<N>([&](int j) {
         w[N + j].load(upper.data() + j * N);
         weights[N + j] = diagonal(j);
@@ -253,8 +253,7 @@ private:
   Status verdict(const Innovation<M, S>& in, bool regular, const UDGaussian<X>& belief,
                  const Columns<N, S>& u, const detail::Column<N, S>& d,
                  const detail::Column<N, S>& step) const {
-    if (!detail::all_finite(in.residual) || !detail::all_finite(in.covariance) ||
-        !detail::finite_state(belief.mean))
+    if (!all_finite(in.residual) || !all_finite(in.covariance) || !detail::finite_state(belief.mean))
       return Status::not_finite;
     S moved(0);
     detail::each<N>([&](int i) { moved += step[i] * S(0); });

@@ -228,7 +228,7 @@ private:
     covariance += symmetrised(q);
     for (int i = 0; i < static_cast<int>(covariance.rows()); ++i)
       covariance(i, i) += static_cast<S>(stabilising_noise);
-    if (!detail::all_finite(covariance) || !detail::finite_state(next.mean)) return Status::not_finite;
+    if (!all_finite(covariance) || !detail::finite_state(next.mean)) return Status::not_finite;
     if (!detail::is_valid_covariance<dof<X>, S>(covariance)) return Status::not_positive_definite;
     belief.mean = next.mean;
     belief.covariance = covariance;
@@ -252,7 +252,7 @@ private:
 
   template <Manifold X>
   [[nodiscard]] static Status refusal(const Gaussian<X>& belief) {
-    return detail::all_finite(belief.covariance) ? Status::not_positive_definite : Status::not_finite;
+    return all_finite(belief.covariance) ? Status::not_positive_definite : Status::not_finite;
   }
 };
 

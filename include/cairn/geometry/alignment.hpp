@@ -98,12 +98,12 @@ struct SymmetricEigen4 {
       }
     if (largest == 0) break;
   }
-  SymmetricEigen4 result{a.diagonal(), v};
+  SymmetricEigen4 result{Vector<4>(a(0, 0), a(1, 1), a(2, 2), a(3, 3)), v};
   for (int i = 0; i < 3; ++i)
     for (int j = 3; j > i; --j)
       if (result.values(j) > result.values(j - 1)) {
         std::swap(result.values(j), result.values(j - 1));
-        result.vectors.col(j).swap(result.vectors.col(j - 1));
+        for (int k = 0; k < 4; ++k) std::swap(result.vectors(k, j), result.vectors(k, j - 1));
       }
   return result;
 }
@@ -201,7 +201,7 @@ private:
                                                                     std::span<const Vector<3>> target,
                                                                     std::span<const double> weights) {
   for (std::size_t i = 0; i < source.size(); ++i) {
-    if (!source[i].allFinite() || !target[i].allFinite())
+    if (!all_finite(source[i]) || !all_finite(target[i]))
       raise("align_points: expected finite coordinates, pair " + std::to_string(i) + " has others");
     if (!weights.empty() && !(weights[i] >= 0 && std::isfinite(weights[i])))
       raise("align_points: expected finite weights >= 0, pair " + std::to_string(i) + " has another");
@@ -213,14 +213,28 @@ private:
 inline void alignment_covariance(const AlignmentMoments& m, double scale, bool determined,
                                  Alignment& result) {
   const Vector<3> centre = scale * m.source_mean;
-  const Matrix<3> scatter = scale * scale * m.source, lever = skew(centre);
-  const Matrix<3> rotation = scatter.trace() * Matrix<3>::Identity() - scatter;
-  result.information << m.weight * Matrix<3>::Identity(), -m.weight * lever, m.weight * lever,
-      rotation - m.weight * lever * lever;
+  const Matrix<3> lever = skew(centre), lever_squared = product(lever, lever);
+  const double trace = scale * scale * m.source.trace();
+  Matrix<3> rotation;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      const double unit = i == j ? 1 : 0;
+      rotation(i, j) = unit * trace - scale * scale * m.source(i, j);
+      result.information(i, j) = unit * m.weight;
+      result.information(i, 3 + j) = -m.weight * lever(i, j);
+      result.information(3 + i, j) = m.weight * lever(i, j);
+      result.information(3 + i, 3 + j) = rotation(i, j) - m.weight * lever_squared(i, j);
+    }
   if (!determined) return;
-  const Matrix<3> c = Cholesky<3>(rotation).inverse();
+  const Matrix<3> c = Cholesky<3>(rotation).inverse(), lever_c = product(lever, c),
+                  lever_c_lever = product(lever_c, lever);
   Matrix<6> covariance;
-  covariance << Matrix<3>::Identity() / m.weight - lever * c * lever, lever * c, -c * lever, c;
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j) {
+      covariance(i, j) = (i == j ? 1 / m.weight : 0) - lever_c_lever(i, j);
+      covariance(i, 3 + j) = covariance(3 + j, i) = lever_c(i, j);
+      covariance(3 + i, 3 + j) = c(i, j);
+    }
   result.covariance = symmetrised(covariance);
 }
 
@@ -238,7 +252,7 @@ inline void alignment_covariance(const AlignmentMoments& m, double scale, bool d
   if (source.empty()) return result;
   const detail::AlignmentMoments m = detail::alignment_moments(source, target, weights);
   const double squares = m.source.trace() + m.target_squares;
-  if (!(std::isfinite(squares) && m.weight >= 0 && m.cross.allFinite()))
+  if (!(std::isfinite(squares) && m.weight >= 0 && all_finite(m.cross)))
     detail::refuse_alignment(source, target, weights);
   for (const double weight : weights)
     if (!(weight >= 0)) detail::refuse_alignment(source, target, weights);

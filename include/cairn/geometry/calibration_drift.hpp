@@ -61,7 +61,7 @@ class CalibrationDrift {
 public:
   explicit CalibrationDrift(const StereoRig& nominal, const CalibrationDriftOptions& options = {})
       : correction_(nominal), options_(options), state_(Vector<5>::Zero()) {
-    covariance_ = Matrix<5>::Identity() * options.initial_sigma * options.initial_sigma;
+    covariance_ = Matrix<5>::Identity() * (options.initial_sigma * options.initial_sigma);
   }
 
   /// The rig with the correction so far.
@@ -127,30 +127,29 @@ private:
   void walk(int frames) {
     const double rotation = options_.walk_rotation * options_.walk_rotation,
                  baseline = options_.walk_baseline * options_.walk_baseline;
-    covariance_.diagonal().head<3>().array() += frames * rotation;
-    covariance_.diagonal().tail<2>().array() += frames * baseline;
+    for (int i = 0; i < 5; ++i) covariance_(i, i) += frames * (i < 3 ? rotation : baseline);
   }
 
   [[nodiscard]] Innovation innovation(const Rays& pair) const {
     const Vector<3> a(pair.left(0), pair.left(1), 1), b(pair.right(0), pair.right(1), 1),
         t = correction_.direction(state_);
     const Matrix<3> R = correction_.rotation(state_).matrix();
-    const Vector<3> m = detail::cross<double>(a, t), Rb = R * b;
-    const Vector<3> left_line = detail::cross<double>(t, Rb), right_line = R.transpose() * m;
+    const Vector<3> m = detail::cross<double>(a, t), Rb = product(R, b);
+    const Vector<3> left_line = detail::cross<double>(t, Rb), right_line = transposed_product(R, m);
     const PinholeCamera &left = correction_.nominal().left, &right = correction_.nominal().right;
     const double fx_l = left.fx(), fy_l = left.fy(), fx_r = right.fx(), fy_r = right.fy();
     const double sigma =
         options_.pixel_sigma * std::sqrt(squared(left_line(0) / fx_l) + squared(left_line(1) / fy_l) +
                                          squared(right_line(0) / fx_r) + squared(right_line(1) / fy_r));
-    Vector<5> H;  // (1)
-    H.head<3>() = detail::cross<double>(b, right_line);
-    H.tail<2>() = correction_.direction_jacobian().transpose() * detail::cross<double>(Rb, a);
-    H /= std::max(sigma, 1e-12);
+    const Vector<3> by_rotation = detail::cross<double>(b, right_line);  // (1)
+    const Vector<2> by_direction =
+        transposed_product(correction_.direction_jacobian(), detail::cross<double>(Rb, a));
     Innovation result;
     result.value = -a.dot(left_line) / std::max(sigma, 1e-12);
-    result.H = H;
-    result.PHt = covariance_ * H;
-    result.variance = 1 + H.dot(result.PHt);
+    result.H << by_rotation(0), by_rotation(1), by_rotation(2), by_direction(0), by_direction(1);
+    result.H /= std::max(sigma, 1e-12);
+    result.PHt = product(covariance_, result.H);
+    result.variance = 1 + result.H.dot(result.PHt);
     return result;
   }
 
@@ -159,7 +158,7 @@ private:
     const Innovation z = innovation(pair);
     if (!(z.value * z.value <= options_.gate * options_.gate * z.variance)) return false;
     state_ += z.PHt * (z.value / z.variance);
-    covariance_ -= z.PHt * z.PHt.transpose() / z.variance;
+    add_outer(covariance_, z.PHt, -1 / z.variance);
     return true;
   }
 
@@ -178,7 +177,7 @@ private:
   void start_again(const std::vector<Rays>& rays) {
     const double focal = 0.5 * (correction_.nominal().left.fy() + correction_.nominal().right.fy());
     const double sigma = std::max(options_.initial_sigma, 2 * typical_distance(rays) / focal);
-    covariance_ = Matrix<5>::Identity() * sigma * sigma;
+    covariance_ = Matrix<5>::Identity() * (sigma * sigma);
     const Vector<5> before = state_;
     std::vector<double> sizes(rays.size());
     for (int step = 0; step < 10; ++step) {
@@ -189,8 +188,8 @@ private:
       for (const Rays& pair : rays) {
         const Innovation z = innovation(pair);
         const double weight = 1 / (1 + squared(z.value / scale));
-        information += weight * z.H * z.H.transpose();
-        gradient += weight * z.value * z.H;
+        add_outer(information, z.H, weight);
+        gradient += (weight * z.value) * z.H;
       }
       state_ += Cholesky<5>(information).solve(gradient);
     }
@@ -206,6 +205,14 @@ private:
   }
 
   [[nodiscard]] static double squared(double value) noexcept { return value * value; }
+
+  /// to += weight v v^T
+  static void add_outer(Matrix<5>& to, const Vector<5>& v, double weight) noexcept {
+    for (int j = 0; j < 5; ++j) {
+      const double factor = weight * v(j);
+      for (int i = 0; i < 5; ++i) to(i, j) += v(i) * factor;
+    }
+  }
 
   RigCorrection correction_;
   CalibrationDriftOptions options_;

@@ -92,7 +92,7 @@ public:
     const double x = (*normalised)(0), y = (*normalised)(1), inverse_z = 1 / point(2);
     Matrix<2, 3> J;
     J << inverse_z, 0, -x * inverse_z, 0, inverse_z, -y * inverse_z;
-    return PixelWithJacobian{distort(*normalised), distortion_jacobian(*normalised) * J};
+    return PixelWithJacobian{distort(*normalised), product(distortion_jacobian(*normalised), J)};
   }
 
   /// Pixel of normalised coordinates. (1)

@@ -112,11 +112,13 @@ public:
     const Cholesky<shared> factor(H);
     if (!factor.good()) return std::nullopt;
     const Vector<shared> d = factor.solve(g);
-    if (!d.allFinite()) return std::nullopt;
+    if (!all_finite(d)) return std::nullopt;
     for (Track& track : tracks_)
-      track.point += track.elimination.solve(Vector<3>(track.gradient - track.coupling * d));
-    motion_ = retract(motion_, Vector<6>(d.head<6>()));
-    state_ += d.tail<5>();
+      track.point += track.elimination.solve(Vector<3>(track.gradient - product(track.coupling, d)));
+    Vector<6> motion_step;
+    for (int i = 0; i < 6; ++i) motion_step(i) = d(i);
+    for (int i = 0; i < 5; ++i) state_(i) += d(6 + i);
+    motion_ = retract(motion_, motion_step);
     return d.dot(g);
   }
 
@@ -128,11 +130,14 @@ public:
     Vector<shared> g;
     gather(state_, Matrix<5>::Zero(), gate, std::numeric_limits<double>::infinity(), H, g);
     H *= efficiency;
-    H.bottomRightCorner<5, 5>() += information;
+    add_to_correction(H, information);
     const Cholesky<shared> factor(H);
     if (!factor.good()) return std::nullopt;
-    const Matrix<5> result = factor.inverse().bottomRightCorner<5, 5>();
-    if (!result.allFinite()) return std::nullopt;
+    const Matrix<shared> inverse = factor.inverse();
+    Matrix<5> result;
+    for (int j = 0; j < 5; ++j)
+      for (int i = 0; i < 5; ++i) result(i, j) = inverse(6 + i, 6 + j);
+    if (!all_finite(result)) return std::nullopt;
     return result;
   }
 
@@ -163,34 +168,52 @@ private:
   /// Nothing where the point is behind a camera.
   [[nodiscard]] std::optional<Linearised> linearise(const Track& track, const Matrix<3>& R,
                                                     const Vector<3>& baseline) const {
-    const Matrix<3> R_after = motion_.rotation().matrix().transpose();
+    const Matrix<3> R_after = transposed(motion_.rotation().matrix());
+    const Matrix<3, 2> by_direction = transposed_product(R, rig_.direction_jacobian());
     Linearised result;
     result.J_shared.setZero();
     for (const std::size_t moment : {0U, 1U}) {
       Vector<3> p = track.point;
       Matrix<3> by_point = Matrix<3>::Identity();
-      Matrix<3, 6> by_motion = Matrix<3, 6>::Zero();
       if (moment == 1) {
-        p = R_after * (p - motion_.translation());
+        const Vector<3> shifted = p - motion_.translation();
+        p = product(R_after, shifted);
         by_point = R_after;
-        by_motion << -Matrix<3>::Identity(), skew(p);
       }
-      const Vector<3> q = R.transpose() * (p - baseline);
-      Matrix<3, 5> by_correction;
-      by_correction << skew(q), -rig_.nominal().baseline() * (R.transpose() * rig_.direction_jacobian());
+      const Vector<3> arm = p - baseline, q = transposed_product(R, arm);
       const auto left = whitened(track.views[2 * moment], p);
       const auto right = whitened(track.views[2 * moment + 1], q);
       if (!left || !right) return std::nullopt;
+      const Matrix<2, 3> right_by_p = product_transposed(right->second, R);
       const int row = moment == 0 ? 0 : 4;
-      result.residual.segment<2>(row) = left->first;
-      result.residual.segment<2>(row + 2) = right->first;
-      result.J_point.middleRows<2>(row) = left->second * by_point;
-      result.J_point.middleRows<2>(row + 2) = right->second * R.transpose() * by_point;
-      result.J_shared.block<2, 6>(row, 0) = left->second * by_motion;
-      result.J_shared.block<2, 6>(row + 2, 0) = right->second * R.transpose() * by_motion;
-      result.J_shared.block<2, 5>(row + 2, 6) = right->second * by_correction;
+      put(left->first, row, 0, result.residual);
+      put(right->first, row + 2, 0, result.residual);
+      put(product(left->second, by_point), row, 0, result.J_point);
+      put(product(right_by_p, by_point), row + 2, 0, result.J_point);
+      if (moment == 1) {  // d p / d motion = [-I, skew(p)]
+        put<2, 3>(-left->second, row, 0, result.J_shared);
+        put(product(left->second, skew(p)), row, 3, result.J_shared);
+        put<2, 3>(-right_by_p, row + 2, 0, result.J_shared);
+        put(product(right_by_p, skew(p)), row + 2, 3, result.J_shared);
+      }
+      put(product(right->second, skew(q)), row + 2, 6, result.J_shared);
+      put<2, 2>(-rig_.nominal().baseline() * product(right->second, by_direction), row + 2, 9,
+                result.J_shared);
     }
     return result;
+  }
+
+  /// Copies `part` into `to` from this row and column on.
+  template <int R, int C, int Rows, int Columns>
+  static void put(const Matrix<R, C>& part, int row, int column, Matrix<Rows, Columns>& to) noexcept {
+    for (int j = 0; j < C; ++j)
+      for (int i = 0; i < R; ++i) to(row + i, column + j) = part(i, j);
+  }
+
+  /// Adds to what the equations say of the correction.
+  static void add_to_correction(Matrix<shared>& H, const Matrix<5>& information) noexcept {
+    for (int j = 0; j < 5; ++j)
+      for (int i = 0; i < 5; ++i) H(6 + i, 6 + j) += information(i, j);
   }
 
   /// Residual of a view and d predicted / d point, both whitened.
@@ -200,8 +223,8 @@ private:
     const double x = p(0) / p(2), y = p(1) / p(2);
     Matrix<2, 3> J;
     J << 1 / p(2), 0, -x / p(2), 0, 1 / p(2), -y / p(2);
-    return std::pair<Vector<2>, Matrix<2, 3>>(view.whitening * (view.observed - Vector<2>(x, y)),
-                                              view.whitening * J);
+    const Vector<2> residual(view.observed(0) - x, view.observed(1) - y);
+    return std::pair(product(view.whitening, residual), product(view.whitening, J));
   }
 
   /// Normal equations of motion and correction with the points eliminated.
@@ -209,8 +232,9 @@ private:
               Matrix<shared>& H, Vector<shared>& g) {
     H.setZero();
     g.setZero();
-    H.bottomRightCorner<5, 5>() = information;
-    g.tail<5>() = information * (mean - state_);
+    add_to_correction(H, information);
+    const Vector<5> from_mean = mean - state_;
+    put(product(information, from_mean), 6, 0, g);
     const Matrix<3> R = rig_.rotation(state_).matrix();
     const Vector<3> baseline = rig_.nominal().baseline() * rig_.direction(state_);
     for (Track& track : tracks_) {
@@ -256,7 +280,7 @@ private:
                                                              const MotionCalibrationOptions& options = {}) {
   MotionCalibration result{state, covariance, guess};
   const Cholesky<5> prior(covariance);
-  CAIRN_EXPECTS(state.allFinite() && covariance.allFinite() && prior.good(),
+  CAIRN_EXPECTS(all_finite(state) && all_finite(covariance) && prior.good(),
                 "calibrate_from_motion: expected a finite state and a positive definite covariance");
   const Matrix<5> information = prior.inverse();
   detail::MotionCalibrationProblem problem(rig, state, guess, pairs);
@@ -274,7 +298,7 @@ private:
   const double efficiency =
       detail::robust_efficiency(RobustLoss::cauchy, options.loss_scale, options.gate_probability, gate, 5);
   const auto posterior = problem.covariance(information, gate, efficiency);
-  if (!posterior || !problem.state().allFinite()) return result;
+  if (!posterior || !all_finite(problem.state())) return result;
   result.inliers = problem.inside(gate);
   result.status = MotionCalibrationStatus::no_consensus;
   if (!detail::enough_inliers(result.inliers, problem.size(), options)) return result;

@@ -30,7 +30,12 @@ public:
     const int least = std::abs(u1(1)) < 0.9 ? 1 : 2;
     Vector<3> u2 = Vector<3>::Unit(least) - u1(least) * u1;
     u2 /= u2.norm();
-    axes_ << u1, u2, detail::cross<double>(u1, u2);
+    const Vector<3> u3 = detail::cross<double>(u1, u2);
+    for (int i = 0; i < 3; ++i) {
+      axes_(i, 0) = u1(i);
+      axes_(i, 1) = u2(i);
+      axes_(i, 2) = u3(i);
+    }
   }
 
   [[nodiscard]] const StereoRig& nominal() const noexcept { return nominal_; }
@@ -44,17 +49,22 @@ public:
 
   /// R of (1), from the right to the left camera.
   [[nodiscard]] SO3 rotation(const Vector<5>& state) const {
-    return nominal_.T_left_right.rotation() * SO3::exp(state.head<3>());
+    return nominal_.T_left_right.rotation() * SO3::exp(Vector<3>(state(0), state(1), state(2)));
   }
 
   /// Unit vector along t of (1).
   [[nodiscard]] Vector<3> direction(const Vector<5>& state) const {
-    const Vector<3> along = axes_ * Vector<3>(1, state(3), state(4));
+    const Vector<3> along = product(axes_, Vector<3>(1, state(3), state(4)));
     return along / along.norm();
   }
 
   /// d direction / d (t_y, t_z) to first order in them.
-  [[nodiscard]] Matrix<3, 2> direction_jacobian() const { return axes_.rightCols<2>(); }
+  [[nodiscard]] Matrix<3, 2> direction_jacobian() const {
+    Matrix<3, 2> J;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 2; ++j) J(i, j) = axes_(i, 1 + j);
+    return J;
+  }
 
 private:
   StereoRig nominal_;

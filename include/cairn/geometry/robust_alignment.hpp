@@ -70,8 +70,8 @@ public:
   RigidProblem(std::span<const PointMatch> pairs, const RobustAlignmentOptions& options)
       : pairs_(pairs), options_(options), gate_(chi_square_quantile(options.gate_probability, 3)) {
     for (std::size_t i = 0; i < pairs.size(); ++i)
-      if (!pairs[i].source.allFinite() || !pairs[i].target.allFinite() ||
-          !pairs[i].source_covariance.allFinite() || !pairs[i].target_covariance.allFinite())
+      if (!all_finite(pairs[i].source) || !all_finite(pairs[i].target) ||
+          !all_finite(pairs[i].source_covariance) || !all_finite(pairs[i].target_covariance))
         raise("align_robustly: expected finite numbers, pair " + std::to_string(i) + " has others");
   }
 
@@ -127,8 +127,8 @@ public:
 
 private:
   struct Equations {
-    Matrix<6> information = Matrix<6>::Zero();
-    Vector<6> gradient = Vector<6>::Zero();
+    Matrix<6> information;
+    Vector<6> gradient;
   };
 
   struct Frame {
@@ -139,35 +139,47 @@ private:
   };
 
   struct Residual {
-    Vector<3> q, r;  // T^-1 y; q - x
-    Matrix<3> weight;
+    Vector<3> q, r;      // T^-1 y; q - x
+    Cholesky<3> factor;  // of the residual's covariance
     Residual(const PointMatch& pair, const Frame& frame)
-        : q(frame.T_source_target * pair.target), r(q - pair.source) {
-      const Matrix<3> half = frame.R_source_target * pair.target_covariance;
-      const Matrix<3> C = pair.source_covariance + half * frame.R_source_target.transpose();
-      const Cholesky<3> factor(C);
-      usable = factor.good();
-      weight = usable ? factor.inverse() : Matrix<3>::Zero();
-    }
+        : q(frame.T_source_target * pair.target), r(q - pair.source), factor(covariance(pair, frame)) {}
+    // Infinite where the covariance is not positive definite: nothing can be said.
     [[nodiscard]] double chi_squared() const noexcept {
-      return usable ? r.dot(weight * r) : std::numeric_limits<double>::infinity();
+      return factor.good() ? factor.whiten(r).squaredNorm() : std::numeric_limits<double>::infinity();
     }
-    bool usable;  // false where the covariance is not positive definite: nothing can be said
+    [[nodiscard]] static Matrix<3> covariance(const PointMatch& pair, const Frame& frame) noexcept {
+      const Matrix<3> half = product(frame.R_source_target, pair.target_covariance);
+      return pair.source_covariance + product_transposed(half, frame.R_source_target);
+    }
   };
 
   [[nodiscard]] Equations linearise(const SE3& motion, double gate, RobustLoss loss) const {
     const Frame frame(motion);
-    Equations e;
+    Matrix<3> translation = Matrix<3>::Zero(), coupling = Matrix<3>::Zero(), rotation = Matrix<3>::Zero();
+    Vector<3> force = Vector<3>::Zero(), moment = Vector<3>::Zero();
     for (const PointMatch& pair : pairs_) {
       const Residual residual(pair, frame);
       const double chi_squared = residual.chi_squared();
       if (!(chi_squared < gate)) continue;
-      const double w = robust_weight(loss, options_.loss_scale, chi_squared);
-      Matrix<3, 6> J;  // (1)
-      J << -Matrix<3>::Identity(), skew(residual.q);
-      const Matrix<6, 3> JW = w * (J.transpose() * residual.weight);
-      e.information += JW * J;
-      e.gradient -= JW * residual.r;
+      const Matrix<3> weight =
+          robust_weight(loss, options_.loss_scale, chi_squared) * residual.factor.inverse();
+      const Matrix<3> lever = skew(residual.q), weight_lever = product(weight, lever);
+      const Vector<3> pull = product(weight, residual.r);
+      translation += weight;
+      coupling -= weight_lever;
+      rotation += transposed_product(lever, weight_lever);
+      force += pull;
+      moment -= transposed_product(lever, pull);
+    }
+    Equations e;  // J^T weight J and -J^T weight r, J of (1)
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        e.information(i, j) = translation(i, j);
+        e.information(i, 3 + j) = e.information(3 + j, i) = coupling(i, j);
+        e.information(3 + i, 3 + j) = rotation(i, j);
+      }
+      e.gradient(i) = force(i);
+      e.gradient(3 + i) = moment(i);
     }
     e.information = symmetrised(e.information);
     return e;

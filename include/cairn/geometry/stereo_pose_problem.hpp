@@ -55,7 +55,7 @@ struct PosePrior {
 namespace detail {
 
 inline void check_start(const SE3& T_world_camera, const Matrix<6>& information) {
-  if (!T_world_camera.matrix().allFinite() || !information.allFinite())
+  if (!all_finite(T_world_camera.matrix()) || !all_finite(information))
     raise("stereo pose: expected a finite pose and information to start from");
 }
 
@@ -230,8 +230,8 @@ private:
     if (!prior_ || prior_->information.isZero(0)) return;
     const Vector<6> error = local(prior_->T_world_camera, pose);
     const Matrix<6> J = SE3::right_jacobian_inverse(error);
-    information += symmetrised(J.transpose() * prior_->information * J);
-    gradient -= J.transpose() * (prior_->information * error);
+    information += symmetrised(transposed_product(J, product(prior_->information, J)));
+    gradient -= transposed_product(J, product(prior_->information, error));
   }
 
   // Sine of the smallest angle of the triangle below 0.02, or a side of no length.

@@ -88,8 +88,8 @@ struct alignas(MatchLane) StereoView {
   double nearest;  // a point so near that its disparity is 20 focal lengths was not seen by both cameras
 
   StereoView(const SE3& T_world_camera, const StereoRig& rig) : nearest(0.05 * rig.baseline()) {
-    const Matrix<3> R_left_world = T_world_camera.rotation().matrix().transpose();
-    const Matrix<3> R_right_world = rig.T_left_right.rotation().matrix().transpose() * R_left_world;
+    const Matrix<3> R_left_world = transposed(T_world_camera.rotation().matrix());
+    const Matrix<3> R_right_world = transposed_product(rig.T_left_right.rotation().matrix(), R_left_world);
     const Vector<3> shift = rig.T_left_right.inverse().translation();
     for (int i = 0; i < 9; ++i) {
       fill(left[i], R_left_world(i / 3, i % 3));
@@ -223,10 +223,11 @@ using LaneMask = decltype(MatchLane{} < MatchLane{});
 }
 
 inline void check_match(const StereoMatch& m, std::size_t index) {
-  if (!m.landmark.allFinite()) refuse_match(index, "a finite landmark position");
-  if (!m.covariance.allFinite() || !(m.covariance.diagonal().minCoeff() >= 0))
+  if (!all_finite(m.landmark)) refuse_match(index, "a finite landmark position");
+  if (!all_finite(m.covariance) ||
+      !(m.covariance(0, 0) >= 0 && m.covariance(1, 1) >= 0 && m.covariance(2, 2) >= 0))
     refuse_match(index, "a finite landmark covariance with a diagonal that is not negative");
-  if (!m.left.allFinite() || !m.right.allFinite()) refuse_match(index, "finite pixels");
+  if (!all_finite(m.left) || !all_finite(m.right)) refuse_match(index, "finite pixels");
   if (!(m.sigma_left > 0 && m.sigma_right > 0 && std::isfinite(m.sigma_left) && std::isfinite(m.sigma_right)))
     refuse_match(index, "positive finite pixel noise");
 }

@@ -53,8 +53,15 @@ struct StereoRig {
     const auto r = right.project_with_jacobian(T_right_left * point);
     if (!l || !r) return std::nullopt;
     StereoPixelsWithJacobian result;
-    result.pixels << l->pixel, r->pixel;
-    result.J_point << l->J_point, r->J_point * T_right_left.rotation().matrix();
+    const Matrix<2, 3> J_right = product(r->J_point, T_right_left.rotation().matrix());
+    for (int i = 0; i < 2; ++i) {
+      result.pixels(i) = l->pixel(i);
+      result.pixels(2 + i) = r->pixel(i);
+      for (int j = 0; j < 3; ++j) {
+        result.J_point(i, j) = l->J_point(i, j);
+        result.J_point(2 + i, j) = J_right(i, j);
+      }
+    }
     return result;
   }
 
@@ -77,13 +84,13 @@ struct StereoRig {
 class EpipolarConstraint {
 public:
   explicit EpipolarConstraint(const StereoRig& rig)
-      : E_(skew(rig.T_left_right.translation()) * rig.T_left_right.rotation().matrix()),
+      : E_(product(skew(rig.T_left_right.translation()), rig.T_left_right.rotation().matrix())),
         inverse_focal_left_(1 / rig.left.fx(), 1 / rig.left.fy()),
         inverse_focal_right_(1 / rig.right.fx(), 1 / rig.right.fy()) {}
 
   /// (1) for normalised coordinates, in units of the baseline.
   [[nodiscard]] double algebraic(const Vector<2>& left, const Vector<2>& right) const noexcept {
-    return ray(left).dot(E_ * ray(right));
+    return ray(left).dot(product(E_, ray(right)));
   }
 
   /// Signed distance in pixels for normalised coordinates (PinholeCamera::normalise once per point, then this
@@ -110,11 +117,15 @@ private:
   // Distortion is left out of the gradient: it changes the scale of a residual of pixels by percents.
   [[nodiscard]] double gradient_squared(const Vector<2>& left, const Vector<2>& right, double weight_left,
                                         double weight_right) const noexcept {
-    const Vector<3> line_left = E_ * ray(right);
-    const Vector<3> line_right = E_.transpose() * ray(left);
-    const Vector<2> g_left = line_left.head<2>().cwiseProduct(inverse_focal_left_);
-    const Vector<2> g_right = line_right.head<2>().cwiseProduct(inverse_focal_right_);
-    return weight_left * g_left.squaredNorm() + weight_right * g_right.squaredNorm();
+    const Vector<3> line_left = product(E_, ray(right)), line_right = transposed_product(E_, ray(left));
+    return weight_left * slope_squared(line_left, inverse_focal_left_) +
+           weight_right * slope_squared(line_right, inverse_focal_right_);
+  }
+
+  // How fast a line's equation changes with the pixel, squared.
+  [[nodiscard]] static double slope_squared(const Vector<3>& line, const Vector<2>& inverse_focal) noexcept {
+    const double x = line(0) * inverse_focal(0), y = line(1) * inverse_focal(1);
+    return x * x + y * y;
   }
 
   Matrix<3> E_;

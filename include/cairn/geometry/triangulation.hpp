@@ -76,15 +76,17 @@ struct PixelRay {
   const double length = m.norm();
   PixelRay ray;
   ray.direction = m / length;
-  Matrix<3> along = Matrix<3>::Identity() - ray.direction * ray.direction.transpose();
-  ray.J_pixel = along.leftCols<2>() * J_normalised / length;
+  Matrix<3, 2> across;  // (I - d d^T) / length, but for its last column: that of the constant 1 in m
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 2; ++j) across(i, j) = ((i == j) - ray.direction(i) * ray.direction(j)) / length;
+  ray.J_pixel = product(across, J_normalised);
   return ray;
 }
 
 /// Feet of the common perpendicular of two rays, (1), and their derivatives by both unit directions.
 struct Feet {
-  double a, b;                      // distances of the feet from the cameras
-  Matrix<1, 3> a_1, a_2, b_1, b_2;  // d a / d d1 ...
+  double a, b;                   // distances of the feet from the cameras
+  Vector<3> a_1, a_2, b_1, b_2;  // d a / d d1 ...
 };
 
 [[nodiscard]] inline Feet feet(const Vector<3>& d1, const Vector<3>& d2, const Vector<3>& w) {
@@ -93,10 +95,10 @@ struct Feet {
   f.a = (k * e2 - e1) / D;
   f.b = (e2 - k * e1) / D;
   const double a_k = (e2 + 2 * k * f.a) / D, b_k = (2 * k * f.b - e1) / D;
-  f.a_1 = (a_k * d2 - w / D).transpose();
-  f.a_2 = (a_k * d1 + (k / D) * w).transpose();
-  f.b_1 = (b_k * d2 - (k / D) * w).transpose();
-  f.b_2 = (b_k * d1 + w / D).transpose();
+  f.a_1 = a_k * d2 - (1 / D) * w;
+  f.a_2 = a_k * d1 + (k / D) * w;
+  f.b_1 = b_k * d2 - (k / D) * w;
+  f.b_2 = b_k * d1 + (1 / D) * w;
   return f;
 }
 
@@ -131,8 +133,8 @@ public:
     if (!l || !r) return refuse(TriangulationStatus::no_ray);
     const detail::PixelRay ray1 = detail::pixel_ray(*l);
     detail::PixelRay ray2 = detail::pixel_ray(*r);
-    ray2.direction = R_left_right_ * ray2.direction;
-    ray2.J_pixel = R_left_right_ * ray2.J_pixel;
+    ray2.direction = product(R_left_right_, ray2.direction);
+    ray2.J_pixel = product(R_left_right_, ray2.J_pixel);
 
     const double sine = detail::cross<double>(ray1.direction, ray2.direction).norm();
     if (!(sine > std::sin(options_.min_parallax))) return refuse(TriangulationStatus::parallel);
@@ -158,19 +160,31 @@ private:
     const bool weighted = options_.method != TriangulationMethod::midpoint;
     const double sum = f.a + f.b, s = weighted ? f.a / sum : 0.5;
     const Vector<3>&d1 = ray1.direction, &d2 = ray2.direction;
-    const Vector<3> foot1 = f.a * d1, foot2 = baseline_ + f.b * d2;
+    const Vector<3> foot1 = f.a * d1, foot2 = baseline_ + f.b * d2, gap = foot2 - foot1;
     result.point = (1 - s) * foot1 + s * foot2;
-    Matrix<3> J_1 = (1 - s) * (d1 * f.a_1) + s * (d2 * f.b_1);
-    Matrix<3> J_2 = (1 - s) * (d1 * f.a_2) + s * (d2 * f.b_2);
-    J_1.diagonal().array() += (1 - s) * f.a;
-    J_2.diagonal().array() += s * f.b;
-    if (weighted) {
-      const Vector<3> across = (foot2 - foot1) / (sum * sum);
-      J_1 += across * (f.b * f.a_1 - f.a * f.b_1);
-      J_2 += across * (f.b * f.a_2 - f.a * f.b_2);
+    if (options_.method == TriangulationMethod::gauss_newton) return;  // which has its own covariance
+    const double by_s = weighted ? 1 / (sum * sum) : 0;                // d s = (b d a - a d b) / (a + b)^2
+    Matrix<3, 2> L, R;                                                 // d point / d left and right pixel
+    for (int c = 0; c < 2; ++c) {
+      double a_l = 0, b_l = 0, a_r = 0, b_r = 0;  // how the feet move with the pixels
+      for (int i = 0; i < 3; ++i) {
+        a_l += f.a_1(i) * ray1.J_pixel(i, c);
+        b_l += f.b_1(i) * ray1.J_pixel(i, c);
+        a_r += f.a_2(i) * ray2.J_pixel(i, c);
+        b_r += f.b_2(i) * ray2.J_pixel(i, c);
+      }
+      const double s_l = by_s * (f.b * a_l - f.a * b_l), s_r = by_s * (f.b * a_r - f.a * b_r);
+      for (int i = 0; i < 3; ++i) {
+        L(i, c) = (1 - s) * (d1(i) * a_l + f.a * ray1.J_pixel(i, c)) + s * d2(i) * b_l + gap(i) * s_l;
+        R(i, c) = (1 - s) * d1(i) * a_r + s * (d2(i) * b_r + f.b * ray2.J_pixel(i, c)) + gap(i) * s_r;
+      }
     }
-    const Matrix<3, 2> L = sigma_left * (J_1 * ray1.J_pixel), R = sigma_right * (J_2 * ray2.J_pixel);
-    result.covariance = L * L.transpose() + R * R.transpose();
+    const double variance_left = sigma_left * sigma_left, variance_right = sigma_right * sigma_right;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j <= i; ++j)
+        result.covariance(i, j) = result.covariance(j, i) =
+            variance_left * (L(i, 0) * L(j, 0) + L(i, 1) * L(j, 1)) +
+            variance_right * (R(i, 0) * R(j, 0) + R(i, 1) * R(j, 1));
   }
 
   // One step on the whitened residuals, in normalised coordinates scaled by the pixels' derivative at the
@@ -178,23 +192,34 @@ private:
   [[nodiscard]] bool gauss_newton_step(Triangulation& result, const NormalisedWithJacobian& l,
                                        const NormalisedWithJacobian& r, double sigma_left,
                                        double sigma_right) const {
-    const Vector<3> p = result.point, q = R_left_right_.transpose() * (p - baseline_);
+    const Vector<3> p = result.point, offset = p - baseline_, q = transposed_product(R_left_right_, offset);
     if (!(p(2) > 0 && q(2) > 0)) return false;
-    Matrix<4, 3> A;
-    Vector<4> e;
-    Matrix<2, 3> J_p, J_q;
-    J_p << 1 / p(2), 0, -p(0) / (p(2) * p(2)), 0, 1 / p(2), -p(1) / (p(2) * p(2));
-    J_q << 1 / q(2), 0, -q(0) / (q(2) * q(2)), 0, 1 / q(2), -q(1) / (q(2) * q(2));
-    A.topRows<2>() = (l.J_pixel / sigma_left) * J_p;
-    A.bottomRows<2>() = (r.J_pixel / sigma_right) * J_q * R_left_right_.transpose();
-    e.head<2>() = (l.J_pixel / sigma_left) * (l.normalised - p.head<2>() / p(2));
-    e.tail<2>() = (r.J_pixel / sigma_right) * (r.normalised - q.head<2>() / q(2));
-    const Matrix<3> information = A.transpose() * A;
+    const Whitened left = whitened(l, p, sigma_left);
+    Whitened right = whitened(r, q, sigma_right);
+    right.J_point = product_transposed(right.J_point, R_left_right_);
+    Matrix<3> information = transposed_product(left.J_point, left.J_point);
+    add_transposed_product(information, right.J_point, right.J_point);
     const Cholesky<3> factor(information);
     if (!factor.good()) return false;
-    result.point += factor.solve(A.transpose() * e);
+    Vector<3> gradient = transposed_product(left.J_point, left.residual);
+    add_transposed_product(gradient, right.J_point, right.residual);
+    result.point += factor.solve(gradient);
     result.covariance = factor.inverse();
     return true;
+  }
+
+  struct Whitened {
+    Matrix<2, 3> J_point;
+    Vector<2> residual;
+  };
+
+  // One camera's residual and the derivative of its prediction by the point, in its frame.
+  [[nodiscard]] static Whitened whitened(const NormalisedWithJacobian& n, const Vector<3>& p, double sigma) {
+    const Matrix<2> W = n.J_pixel / sigma;
+    const double x = p(0) / p(2), y = p(1) / p(2);
+    Matrix<2, 3> J;
+    J << 1 / p(2), 0, -x / p(2), 0, 1 / p(2), -y / p(2);
+    return {product(W, J), product(W, Vector<2>(n.normalised(0) - x, n.normalised(1) - y))};
   }
 
   PinholeCamera left_, right_;

@@ -42,17 +42,23 @@ public:
       if (!(m(3, i) == S(0)) || !(m(i, 3) - m(i, 3) == S(0)))
         raise("SE3::from_matrix: expected a finite translation and the last row 0 0 0 1");
     if (!(m(3, 3) == S(1))) raise("SE3::from_matrix: expected the last row 0 0 0 1");
-    const Matrix<3, 3, S> rotation = m.template topLeftCorner<3, 3>();
-    return BasicSE3(BasicSO3<S>::from_matrix(rotation, tolerance), m.template topRightCorner<3, 1>());
+    Matrix<3, 3, S> rotation;
+    for (int i = 0; i < 9; ++i) rotation(i / 3, i % 3) = m(i / 3, i % 3);
+    return BasicSE3(BasicSO3<S>::from_matrix(rotation, tolerance), Vector<3, S>(m(0, 3), m(1, 3), m(2, 3)));
   }
 
   [[nodiscard]] const BasicSO3<S>& rotation() const noexcept { return rotation_; }
   [[nodiscard]] const Vector<3, S>& translation() const noexcept { return translation_; }
 
   [[nodiscard]] Matrix<4, 4, S> matrix() const {
-    Matrix<4, 4, S> m = Matrix<4, 4, S>::Identity();
-    m.template topLeftCorner<3, 3>() = rotation_.matrix();
-    m.template topRightCorner<3, 1>() = translation_;
+    const Matrix<3, 3, S> rotation = rotation_.matrix();
+    Matrix<4, 4, S> m;
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) m(i, j) = rotation(i, j);
+      m(i, 3) = translation_(i);
+      m(3, i) = S(0);
+    }
+    m(3, 3) = S(1);
     return m;
   }
 
@@ -69,36 +75,34 @@ public:
   }
 
   [[nodiscard]] static BasicSE3 exp(const Tangent& d) {  // (1)
-    const Vector<3, S> rho = d.template head<3>(), omega = d.template tail<3>();
-    return BasicSE3(BasicSO3<S>::exp(omega), BasicSO3<S>::left_jacobian(omega) * rho);
+    const Vector<3, S> rho = translation_of(d), omega = rotation_of(d);
+    return BasicSE3(BasicSO3<S>::exp(omega), product(BasicSO3<S>::left_jacobian(omega), rho));
   }
 
   /// The step from the identity to this motion; its rotation part is at most pi long.
   [[nodiscard]] Tangent log() const {
     const Vector<3, S> omega = rotation_.log();
+    const Vector<3, S> rho = product(BasicSO3<S>::left_jacobian_inverse(omega), translation_);
     Tangent d;
-    d.template head<3>() = BasicSO3<S>::left_jacobian_inverse(omega) * translation_;
-    d.template tail<3>() = omega;
+    d << rho(0), rho(1), rho(2), omega(0), omega(1), omega(2);
     return d;
   }
 
   [[nodiscard]] Matrix<6, 6, S> adjoint() const {  // (2)
     const Matrix<3, 3, S> R = rotation_.matrix();
-    return upper_triangular(R, skew(translation_) * R);
+    return upper_triangular(R, product(skew(translation_), R));
   }
 
   [[nodiscard]] static Matrix<6, 6, S> left_jacobian(const Tangent& d) {  // (3)
-    const Vector<3, S> omega = d.template tail<3>();
-    return upper_triangular(BasicSO3<S>::left_jacobian(omega), coupling(d));
+    return upper_triangular(BasicSO3<S>::left_jacobian(rotation_of(d)), coupling(d));
   }
   /// exp(d + e) ~ exp(d) exp(J_r e); J_r(d) = J_l(-d).
   [[nodiscard]] static Matrix<6, 6, S> right_jacobian(const Tangent& d) { return left_jacobian(-d); }
 
   /// Inverse of left_jacobian; finite for rotations below 2 pi.
   [[nodiscard]] static Matrix<6, 6, S> left_jacobian_inverse(const Tangent& d) {
-    const Vector<3, S> omega = d.template tail<3>();
-    const Matrix<3, 3, S> inverse = BasicSO3<S>::left_jacobian_inverse(omega);
-    return upper_triangular(inverse, -inverse * coupling(d) * inverse);
+    const Matrix<3, 3, S> inverse = BasicSO3<S>::left_jacobian_inverse(rotation_of(d));
+    return upper_triangular(inverse, -product(inverse, product(coupling(d), inverse)));
   }
   [[nodiscard]] static Matrix<6, 6, S> right_jacobian_inverse(const Tangent& d) {
     return left_jacobian_inverse(-d);
@@ -113,18 +117,33 @@ private:
   [[nodiscard]] static Matrix<6, 6, S> upper_triangular(const Matrix<3, 3, S>& diagonal,
                                                         const Matrix<3, 3, S>& corner) {
     Matrix<6, 6, S> m;
-    m << diagonal, corner, Matrix<3, 3, S>::Zero(), diagonal;
+    for (int j = 0; j < 3; ++j)
+      for (int i = 0; i < 3; ++i) {
+        m(i, j) = m(3 + i, 3 + j) = diagonal(i, j);
+        m(i, 3 + j) = corner(i, j);
+        m(3 + i, j) = S(0);
+      }
     return m;
   }
 
+  [[nodiscard]] static Vector<3, S> translation_of(const Tangent& d) { return {d(0), d(1), d(2)}; }
+  [[nodiscard]] static Vector<3, S> rotation_of(const Tangent& d) { return {d(3), d(4), d(5)}; }
+
   // Q(rho, w) of (3).
   [[nodiscard]] static Matrix<3, 3, S> coupling(const Tangent& d) {
-    const Vector<3, S> rho = d.template head<3>(), omega = d.template tail<3>();
+    const Vector<3, S> omega = rotation_of(d);
     const Stumpff<S> f = stumpff<S>(omega.squaredNorm());
-    const Matrix<3, 3, S> P = skew(rho), W = skew(omega);
-    const Matrix<3, 3, S> WP = W * P, PW = P * W, WPW = WP * W;
-    return S(0.5) * P + f.c[3] * (WP + PW + WPW) + f.c[4] * (W * WP + PW * W - S(3) * WPW) +
-           S(0.5) * (f.c[4] - S(3) * f.c[5]) * (WPW * W + W * WPW);
+    const S last = S(0.5) * (f.c[4] - S(3) * f.c[5]);
+    const Matrix<3, 3, S> P = skew(translation_of(d)), W = skew(omega);
+    const Matrix<3, 3, S> WP = product(W, P), PW = product(P, W), WPW = product(WP, W);
+    const Matrix<3, 3, S> WWP = product(W, WP), PWW = product(PW, W), WPWW = product(WPW, W),
+                          WWPW = product(W, WPW);
+    Matrix<3, 3, S> Q;
+    for (int j = 0; j < 3; ++j)
+      for (int i = 0; i < 3; ++i)
+        Q(i, j) = S(0.5) * P(i, j) + f.c[3] * (WP(i, j) + PW(i, j) + WPW(i, j)) +
+                  f.c[4] * (WWP(i, j) + PWW(i, j) - S(3) * WPW(i, j)) + last * (WPWW(i, j) + WWPW(i, j));
+    return Q;
   }
 
   BasicSO3<S> rotation_;

@@ -54,17 +54,20 @@ public:
   /// The rotation nearest to `m`. Throws Error where m^T m differs from I by more than `tolerance` in an
   /// entry, or m is a reflection: files carry 6 or 7 digits, a matrix in another convention is far away.
   [[nodiscard]] static BasicSO3 from_matrix(const Matrix<3, 3, S>& m, const S& tolerance = S(1e-3)) {
-    const Matrix<3, 3, S> gram = m.transpose() * m - Matrix<3, 3, S>::Identity();
-    for (int i = 0; i < 9; ++i)
-      if (!(gram(i / 3, i % 3) <= tolerance && gram(i / 3, i % 3) >= -tolerance))
+    const Matrix<3, 3, S> gram = transposed_product(m, m);
+    for (int i = 0; i < 9; ++i) {
+      const S error = gram(i / 3, i % 3) - S(i % 4 == 0 ? 1 : 0);
+      if (!(error <= tolerance && error >= -tolerance))
         raise("SO3::from_matrix: expected a rotation matrix; its columns are not orthonormal");
+    }
     Matrix<3, 3, S> r = m;
     for (int step = 0; step < 3; ++step) {  // Newton's iteration for the polar factor: (r + r^-T) / 2
       const Matrix<3, 3, S> cofactors = cofactor_matrix(r);
-      const S determinant = r.row(0).dot(cofactors.row(0));
+      const S determinant = r(0, 0) * cofactors(0, 0) + r(0, 1) * cofactors(0, 1) + r(0, 2) * cofactors(0, 2);
       if (!(determinant > S(0)))
         raise("SO3::from_matrix: expected a rotation matrix, found a reflection (determinant -1)");
-      r = (S(0.5) * (r + cofactors / determinant)).eval();
+      for (int i = 0; i < 9; ++i)
+        r(i / 3, i % 3) = S(0.5) * (r(i / 3, i % 3) + cofactors(i / 3, i % 3) / determinant);
     }
     return from_orthonormal(r);
   }
@@ -132,8 +135,7 @@ public:
 
   [[nodiscard]] static Matrix<3, 3, S> left_jacobian(const Tangent& omega) {  // (2)
     const Stumpff<S> f = stumpff<S>(omega.squaredNorm());
-    const Matrix<3, 3, S> W = skew(omega);
-    return Matrix<3, 3, S>::Identity() + f.c[2] * W + f.c[3] * W * W;
+    return polynomial(f.c[2], f.c[3], omega);
   }
   [[nodiscard]] static Matrix<3, 3, S> right_jacobian(const Tangent& omega) {  // (3)
     return left_jacobian(-omega);
@@ -143,8 +145,7 @@ public:
   [[nodiscard]] static Matrix<3, 3, S> left_jacobian_inverse(const Tangent& omega) {
     const Stumpff<S> f = stumpff<S>(omega.squaredNorm());
     const S quadratic = (f.c[3] - S(2) * f.c[4]) / (S(2) * f.c[2]);  // = (1 - c_1 / (2 c_2)) / a^2
-    const Matrix<3, 3, S> W = skew(omega);
-    return Matrix<3, 3, S>::Identity() - S(0.5) * W + quadratic * W * W;
+    return polynomial(S(-0.5), quadratic, omega);
   }
   [[nodiscard]] static Matrix<3, 3, S> right_jacobian_inverse(const Tangent& omega) {
     return left_jacobian_inverse(-omega);
@@ -165,12 +166,25 @@ private:
     return BasicSO3(w_ * factor, v_ * factor);
   }
 
+  // I + linear W + quadratic W^2, W = skew(w): W^2 = w w^T - |w|^2 I.
+  [[nodiscard]] static Matrix<3, 3, S> polynomial(const S& linear, const S& quadratic, const Tangent& w) {
+    Matrix<3, 3, S> result = skew(w);
+    const S diagonal = S(1) - quadratic * w.squaredNorm();
+    for (int j = 0; j < 3; ++j) {
+      const S factor = quadratic * w(j);
+      for (int i = 0; i < 3; ++i) result(i, j) = linear * result(i, j) + w(i) * factor;
+      result(j, j) += diagonal;
+    }
+    return result;
+  }
+
   [[nodiscard]] static Matrix<3, 3, S> cofactor_matrix(const Matrix<3, 3, S>& m) {
-    const Vector<3, S> a = m.row(0), b = m.row(1), c = m.row(2);
     Matrix<3, 3, S> result;
-    result.row(0) = detail::cross<S>(b, c);
-    result.row(1) = detail::cross<S>(c, a);
-    result.row(2) = detail::cross<S>(a, b);
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        const int i1 = (i + 1) % 3, i2 = (i + 2) % 3, j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+        result(i, j) = m(i1, j1) * m(i2, j2) - m(i1, j2) * m(i2, j1);
+      }
     return result;
   }
 
