@@ -167,14 +167,15 @@ template <FieldInterpolant Map>
 void refine(Fix& fix, const Map& map, const PatchShape& shape, std::span<const double> z,
             const BankPeak& best, int reach_along, int reach_across, bool interior,
             const SearchOptions& options) {
-  Matrix<2> steps;  // ground per column and per row of the surface
-  steps << best.placement.along_x, -best.placement.across_x, best.placement.along_y, -best.placement.across_y;
-  Vector<2> cell(best.column - reach_along, best.row - reach_across);
-  if (interior) cell += paraboloid_vertex(best.surface, best.column, best.row);
-  const Vector<2> shift = steps * cell;
+  double a = best.column - reach_along, b = reach_across - best.row;  // samples from the guess
+  if (interior) {
+    const Vector<2> vertex = paraboloid_vertex(best.surface, best.column, best.row);
+    a += vertex(0);
+    b -= vertex(1);
+  }
   fix.placement = best.placement;
-  fix.placement.x += shift(0);
-  fix.placement.y += shift(1);
+  fix.placement.x += a * best.placement.along_x + b * best.placement.across_x;
+  fix.placement.y += a * best.placement.along_y + b * best.placement.across_y;
   if (!interior) return;
   const auto refined = refined_placement(map, shape, z, fix.placement, options.scale_sigma,
                                          options.heading_sigma, options.smallest_share);
@@ -189,7 +190,7 @@ void refine(Fix& fix, const Map& map, const PatchShape& shape, std::span<const d
 /// The larger standard deviation of a place, in samples.
 inline double worst_sigma(const Fix& fix) {
   const Matrix<2>& c = fix.covariance;
-  const double largest = 0.5 * c.trace() + std::hypot(0.5 * (c(0, 0) - c(1, 1)), c(0, 1));
+  const double largest = 0.5 * (c(0, 0) + c(1, 1)) + std::hypot(0.5 * (c(0, 0) - c(1, 1)), c(0, 1));
   return std::sqrt(largest) / sample_spacing(fix.placement);
 }
 

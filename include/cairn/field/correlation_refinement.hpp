@@ -91,16 +91,20 @@ inline MovedPlacement moved(const PatchPlacement& p, const Vector<5>& theta, dou
                             double heading_sigma) {
   const double c = std::cos(heading_sigma * theta(4)), s = std::sin(heading_sigma * theta(4));
   const double along = 1.0 + scale_sigma * theta(2), across = 1.0 + scale_sigma * theta(3);
-  const Vector<2> a{c * p.along_x - s * p.along_y, s * p.along_x + c * p.along_y};
-  const Vector<2> b{c * p.across_x - s * p.across_y, s * p.across_x + c * p.across_y};
-  MovedPlacement result{
-      {p.x + theta(0), p.y + theta(1), along * a(0), along * a(1), across * b(0), across * b(1)},
-      Matrix<6, 5>::Zero()};
-  result.jacobian(0, 0) = result.jacobian(1, 1) = 1.0;
-  result.jacobian.block<2, 1>(2, 2) = scale_sigma * a;
-  result.jacobian.block<2, 1>(4, 3) = scale_sigma * b;
-  result.jacobian.block<4, 1>(2, 4) << -along * a(1), along * a(0), -across * b(1), across * b(0);
-  result.jacobian.block<4, 1>(2, 4) *= heading_sigma;
+  const double ax = c * p.along_x - s * p.along_y, ay = s * p.along_x + c * p.along_y;
+  const double bx = c * p.across_x - s * p.across_y, by = s * p.across_x + c * p.across_y;
+  MovedPlacement result{{p.x + theta(0), p.y + theta(1), along * ax, along * ay, across * bx, across * by},
+                        Matrix<6, 5>::Zero()};
+  Matrix<6, 5>& J = result.jacobian;
+  J(0, 0) = J(1, 1) = 1.0;
+  J(2, 2) = scale_sigma * ax;
+  J(3, 2) = scale_sigma * ay;
+  J(4, 3) = scale_sigma * bx;
+  J(5, 3) = scale_sigma * by;
+  J(2, 4) = -heading_sigma * along * ay;
+  J(3, 4) = heading_sigma * along * ax;
+  J(4, 4) = -heading_sigma * across * by;
+  J(5, 4) = heading_sigma * across * bx;
   return result;
 }
 
@@ -129,7 +133,8 @@ std::optional<RefinedPlacement> refined_placement(const Map& map, const PatchSha
     const bool seen =
         linearise.gram(map, shape, at.placement, z, unit, scratch, frame) == PatchVerdict::accepted;
     const auto n = static_cast<double>(frame.samples);
-    const double cost = n * std::log(std::max(frame.squares, 1e-300)) + theta.tail<3>().squaredNorm();
+    double cost = n * std::log(std::max(frame.squares, 1e-300));
+    for (int i = 2; i < 5; ++i) cost += theta(i) * theta(i);
     if (!seen && k == 0) return std::nullopt;
     if (!seen || cost > least) {  // too far: half way back
       theta = 0.5 * (theta + best);
@@ -139,15 +144,21 @@ std::optional<RefinedPlacement> refined_placement(const Map& map, const PatchSha
     best = theta;
     // Of gain, bias and shift four numbers are fitted; a perfect frame is taken for one of double precision.
     const double variance = std::max(frame.squares / std::max(n - 4.0, 1.0), 1e-24 * frame.information(0, 0));
-    Matrix<5> normal = at.jacobian.transpose() * frame.information * at.jacobian / variance;
-    Vector<5> gradient = at.jacobian.transpose() * frame.gradient / variance;
-    normal.diagonal().tail<3>().array() += 1.0;
-    gradient.tail<3>() -= theta.tail<3>();
+    Matrix<5> normal = frame.information_by(at.jacobian) / variance;
+    Vector<5> gradient = frame.gradient_by(at.jacobian) / variance;
+    for (int i = 2; i < 5; ++i) {
+      normal(i, i) += 1.0;
+      gradient(i) -= theta(i);
+    }
     const Cholesky<5> factor(normal);
     if (!factor.good() || !(factor.least_share() > 1e-13)) return std::nullopt;
     const Vector<5> step = factor.solve(gradient);
-    result = RefinedPlacement{at.placement, factor.inverse().topLeftCorner<2, 2>()};
-    if (step.dot(normal * step) < small * small) break;
+    const Matrix<5> covariance = factor.inverse();
+    result.emplace();
+    result->placement = at.placement;
+    for (int j = 0; j < 2; ++j)
+      for (int i = 0; i < 2; ++i) result->covariance(i, j) = covariance(i, j);
+    if (step.dot(product(normal, step)) < small * small) break;
     theta += step;
   }
   return result;

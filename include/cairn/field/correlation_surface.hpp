@@ -127,7 +127,7 @@ inline Vector<2> paraboloid_vertex(const Plane& s, int c, int r) {
   for (int j = -1; j <= 1; ++j)
     for (int i = -1; i <= 1; ++i) {
       const double f = s(c + i, r + j);
-      if (f == nothing) return Vector<2>::Zero();
+      if (f == nothing) return {0.0, 0.0};
       sx += i * f;
       sy += j * f;
       sxx += i * i * f;
@@ -137,10 +137,10 @@ inline Vector<2> paraboloid_vertex(const Plane& s, int c, int r) {
     }
   const double cross = 0.25 * sxy, xx = sxx - 2.0 / 3.0 * sum, yy = syy - 2.0 / 3.0 * sum;
   const double determinant = xx * yy - cross * cross;
-  if (!(xx < 0.0 && determinant > 0.0)) return Vector<2>::Zero();
-  const Vector<2> vertex{-(yy * sx - cross * sy) / (6.0 * determinant),
-                         -(xx * sy - cross * sx) / (6.0 * determinant)};
-  return vertex.cwiseAbs().maxCoeff() <= 1.0 ? vertex : Vector<2>::Zero();
+  if (!(xx < 0.0 && determinant > 0.0)) return {0.0, 0.0};
+  const double x = -(yy * sx - cross * sy) / (6.0 * determinant);
+  const double y = -(xx * sy - cross * sx) / (6.0 * determinant);
+  return std::max(std::abs(x), std::abs(y)) <= 1.0 ? Vector<2>(x, y) : Vector<2>(0.0, 0.0);
 }
 
 }  // namespace detail

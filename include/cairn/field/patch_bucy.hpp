@@ -65,14 +65,20 @@ int dormand_prince(Vec& y, double t, double end, double tolerance, int most_step
     bool good = true;
     for (std::size_t stage = 1; stage < 7 && good; ++stage) {
       next = y;
-      for (std::size_t j = 0; j < stage; ++j) next += (step * a[stage][j]) * k[j];
+      for (std::size_t j = 0; j < stage; ++j)
+        for (int i = 0; i < y.size(); ++i) next(i) += step * a[stage][j] * k[j](i);
       good = slope(t + c[stage] * step, next, k[stage]);
     }
     double worst = 1e3;
     if (good) {
-      Vec error = Vec::Zero();
-      for (std::size_t j = 0; j < 7; ++j) error += (step * difference[j]) * k[j];
-      worst = (error.cwiseAbs().cwiseQuotient(scales(y))).maxCoeff() / tolerance;
+      const Vec scale = scales(y);
+      worst = 0.0;
+      for (int i = 0; i < y.size(); ++i) {
+        double error = 0;
+        for (std::size_t j = 0; j < 7; ++j) error += step * difference[j] * k[j](i);
+        const double share = std::abs(error) / (scale(i) * tolerance);
+        worst = std::max(worst, share < 1e4 ? share : 1e4);  // NaN too is a step too long
+      }
     }
     if (worst <= 1.0) {
       t += step;
@@ -94,17 +100,27 @@ template <int N>
 bool pack_belief(const Gaussian<Vector<N>>& belief, PackedBelief<N>& y) {
   const Cholesky<N> prior(belief.covariance);
   if (!prior.good()) return false;
-  y << belief.mean, prior.inverse().reshaped();
+  const Matrix<N> sigma = prior.inverse();
+  std::copy_n(belief.mean.data(), N, y.data());
+  std::copy_n(sigma.data(), N * N, y.data() + N);
   return true;
+}
+
+template <int N>
+Vector<N> packed_mean(const PackedBelief<N>& y) {
+  return Vector<N>(y.data());
+}
+template <int N>
+Matrix<N> packed_information(const PackedBelief<N>& y) {
+  return Matrix<N>(y.data() + N);
 }
 
 /// False, and the belief as it was, when the information is not positive definite.
 template <int N>
 bool unpack_belief(const PackedBelief<N>& y, Gaussian<Vector<N>>& belief) {
-  const Matrix<N> sigma = symmetrised(y.template tail<N * N>().reshaped(N, N));
-  const Cholesky<N> posterior(sigma);
+  const Cholesky<N> posterior(symmetrised(packed_information<N>(y)));
   if (!posterior.good()) return false;
-  belief.mean = y.template head<N>();
+  belief.mean = packed_mean<N>(y);
   belief.covariance = posterior.inverse();
   return true;
 }
@@ -112,9 +128,30 @@ bool unpack_belief(const PackedBelief<N>& y, Gaussian<Vector<N>>& belief) {
 /// What errors of y are compared with: sigmas, and products of the information's diagonal.
 template <int N>
 PackedBelief<N> error_scales(const PackedBelief<N>& y) {
-  const Vector<N> root = y.template tail<N * N>().reshaped(N, N).diagonal().cwiseSqrt();
+  double root[N];
+  for (int i = 0; i < N; ++i) root[i] = std::sqrt(y(N + i * (N + 1)));
   PackedBelief<N> result;
-  result << root.cwiseInverse(), (root * root.transpose()).reshaped();
+  for (int j = 0; j < N; ++j) {
+    result(j) = 1.0 / root[j];
+    for (int i = 0; i < N; ++i) result(N + j * N + i) = root[i] * root[j];
+  }
+  return result;
+}
+
+/// (1) and (2), given what the motion says (dX/dt, A, Q) and the frame, by which the placement has the
+/// derivative J.
+template <int N>
+PackedBelief<N> belief_rate(const Matrix<N>& sigma, const Cholesky<N>& factor, const PatchGram& frame,
+                            const Matrix<6, N>& J, const Vector<N>& rate, const Matrix<N>& A,
+                            const Matrix<N>& Q) {
+  const Vector<N> step = factor.solve(frame.gradient_by(J));
+  const Matrix<N> gained = frame.information_by(J), moved = product(sigma, A);
+  const Matrix<N> lost = product(sigma, product(Q, sigma));
+  PackedBelief<N> result;
+  for (int j = 0; j < N; ++j) {
+    result(j) = rate(j) + step(j);
+    for (int i = 0; i < N; ++i) result(N + j * N + i) = gained(i, j) - moved(i, j) - moved(j, i) - lost(i, j);
+  }
   return result;
 }
 
@@ -171,23 +208,18 @@ PatchVerdict PatchBucy::integrate(Gaussian<typename Placement::State>& belief, c
   const PatchNoise noise(density);
   PatchVerdict verdict = PatchVerdict::accepted;
   const auto slope = [&](double time, const Packed& at, Packed& result) {
-    const Vector<N> x = at.template head<N>();
-    const Matrix<N> sigma = at.template tail<N * N>().reshaped(N, N);
+    const Vector<N> x = detail::packed_mean<N>(at);
+    const Matrix<N> sigma = detail::packed_information<N>(at);
     const Cholesky<N> factor(sigma);
     PatchGram frame;
-    verdict = !at.allFinite() || !factor.good()
+    verdict = !all_finite(at) || !factor.good()
                   ? PatchVerdict::not_positive_definite
                   : PatchLinearisation{}.gram(map, shape, where.placement(x), frame_at(time), noise, scratch,
                                               frame);
-    if (verdict == PatchVerdict::accepted && !frame.gradient.allFinite()) verdict = PatchVerdict::not_finite;
+    if (verdict == PatchVerdict::accepted && !all_finite(frame.gradient)) verdict = PatchVerdict::not_finite;
     if (verdict != PatchVerdict::accepted) return false;
-    const auto J = where.jacobian(x);
-    const Matrix<N> A = motion.rate_jacobian(x, control);
-    result.template head<N>() =
-        motion.rate(x, control) + factor.solve(J.transpose() * frame.gradient);  // (1)
-    const Matrix<N> rate = J.transpose() * frame.information * J - sigma * A - A.transpose() * sigma -
-                           sigma * motion.spectral_density(x, control) * sigma;  // (2)
-    result.template tail<N * N>() = rate.reshaped();
+    result = detail::belief_rate<N>(sigma, factor, frame, where.jacobian(x), motion.rate(x, control),
+                                    motion.rate_jacobian(x, control), motion.spectral_density(x, control));
     return true;
   };
   const bool arrived =

@@ -73,8 +73,8 @@ struct PatchFilter {
     if (linearisation().gram(map, shape, where.placement(x), {}, noise, scratch, result) !=
         PatchVerdict::accepted)
       return std::nullopt;
-    const auto J = where.jacobian(x);
-    return (J.transpose() * result.information * J).eval();
+    const Matrix<6, Placement::State::RowsAtCompileTime> J = where.jacobian(x);
+    return result.information_by(J);
   }
 
 private:
@@ -93,7 +93,7 @@ PatchUpdate PatchFilter::update(Gaussian<typename Placement::State>& belief, con
   CAIRN_EXPECTS(iterations >= 1, "PatchFilter needs at least one linearisation");
   PatchUpdate result;
   result.verdict = PatchVerdict::not_finite;
-  if (!belief.mean.allFinite() || !belief.covariance.allFinite()) return result;
+  if (!all_finite(belief.mean) || !all_finite(belief.covariance)) return result;
   for (const double value : z)
     if (!std::isfinite(value)) return result;
   const Cholesky<n> root(belief.covariance);
@@ -114,8 +114,8 @@ PatchUpdate PatchFilter::update(Gaussian<typename Placement::State>& belief, con
     result.verdict = PatchVerdict::gated;
   if (!result.accepted()) return result;
   const Matrix<n> M = Matrix<n>::Identity() + A;
-  belief.mean += L * u;
-  belief.covariance = symmetrised(L * Cholesky<n>(M).solve(Matrix<n>(L.transpose())));  // (2)
+  belief.mean += product(L, u);
+  belief.covariance = symmetrised(product(L, Cholesky<n>(M).solve(transposed(L))));  // (2)
   return result;
 }
 
@@ -127,7 +127,7 @@ void PatchFilter::minimise(const typename Placement::State& mean, const Matrix<N
   double least = std::numeric_limits<double>::infinity();
   PatchGram frame;
   for (bool done = false; !done && result.iterations < iterations;) {
-    const typename Placement::State x = mean + L * u;
+    const typename Placement::State x = mean + product(L, u);
     const PatchVerdict seen = linearise(x, frame);
     ++result.iterations;
     const double cost = u.squaredNorm() + frame.squares;
@@ -139,15 +139,15 @@ void PatchFilter::minimise(const typename Placement::State& mean, const Matrix<N
     if (!result.accepted()) return;
     least = cost;
     best = u;
-    const auto J = (where.jacobian(x) * L).eval();
-    A = J.transpose() * frame.information * J;
+    const Matrix<6, N> J = product(Matrix<6, N>(where.jacobian(x)), L);
+    A = frame.information_by(J);
     result.samples = frame.samples;
     result.residual = frame.squares / static_cast<double>(frame.samples);
     result.gain = frame.gain;
     const Matrix<N> M = Matrix<N>::Identity() + A;
-    u = Cholesky<N>(M).solve(J.transpose() * frame.gradient + A * best);  // (1)
+    u = Cholesky<N>(M).solve(Vector<N>(frame.gradient_by(J) + product(A, best)));  // (1)
     const Vector<N> step = u - best;
-    done = step.dot(M * step) < tolerance * tolerance;
+    done = step.dot(product(M, step)) < tolerance * tolerance;
   }
 }
 

@@ -40,11 +40,21 @@ struct PatchScratch {
 
 /// A frame linearised at a placement, gain and bias eliminated where asked for.
 struct PatchGram {
-  Matrix<6> information;  ///< of the placement's six numbers
-  Vector<6> gradient;     ///< W^T C^-1 (z - h)
-  double squares = 0;     ///< (z - h)^T C^-1 (z - h)
-  double gain = 1;        ///< fitted where free_gain, otherwise 1
+  Matrix<6> information = Matrix<6>::Zero();  ///< of the placement's six numbers
+  Vector<6> gradient = Vector<6>::Zero();     ///< W^T C^-1 (z - h)
+  double squares = 0;                         ///< (z - h)^T C^-1 (z - h)
+  double gain = 1;                            ///< fitted where free_gain, otherwise 1
   std::size_t samples = 0;
+
+  /// J^T information J and J^T gradient, for numbers by which the placement has the derivative J.
+  template <int N>
+  [[nodiscard]] Matrix<N> information_by(const Matrix<6, N>& J) const {
+    return transposed_product(J, product(information, J));
+  }
+  template <int N>
+  [[nodiscard]] Vector<N> gradient_by(const Matrix<6, N>& J) const {
+    return transposed_product(J, gradient);
+  }
 };
 
 /// How a frame is linearised; holds no state.
@@ -105,8 +115,10 @@ private:
   /// Eliminates row and column k. False when what is left of its diagonal is rounding.
   static bool eliminate(Matrix<9>& gram, int k, double original_diagonal) {
     if (!(gram(k, k) > 1e-12 * original_diagonal)) return false;
-    const Vector<9> column = gram.col(k) / std::sqrt(gram(k, k));
-    gram -= column * column.transpose();
+    double column[9];
+    for (int i = 0; i < 9; ++i) column[i] = gram(i, k) / std::sqrt(gram(k, k));
+    for (int j = 0; j < 9; ++j)
+      for (int i = 0; i < 9; ++i) gram(i, j) -= column[i] * column[j];
     return true;
   }
 
@@ -119,8 +131,10 @@ private:
       if (!eliminate(all, 7, value_diagonal)) return false;
       result.gain = 1.0 + excess;
     }
-    result.information = (result.gain * result.gain) * all.topLeftCorner<6, 6>();
-    result.gradient = result.gain * all.topRightCorner<6, 1>();
+    for (int j = 0; j < 6; ++j) {
+      for (int i = 0; i < 6; ++i) result.information(i, j) = result.gain * result.gain * all(i, j);
+      result.gradient(j) = result.gain * all(j, 8);
+    }
     result.squares = all(8, 8);
     return true;
   }

@@ -51,14 +51,22 @@ struct AlongTrackMotion {
   TrackNoise density{};
 
   // In continuous time (ContinuousProcess of filter/kalman_bucy.hpp).
-  [[nodiscard]] State rate(const State& x, const Control&) const { return x(1) * State::Unit(0); }
+  [[nodiscard]] State rate(const State& x, const Control&) const {
+    State result = State::Zero();
+    result(0) = x(1);
+    return result;
+  }
   [[nodiscard]] Matrix<5> rate_jacobian(const State&, const Control&) const {
     Matrix<5> F = Matrix<5>::Zero();
     F(0, 1) = 1.0;
     return F;
   }
   [[nodiscard]] Matrix<5> spectral_density(const State&, const Control&) const {
-    return Vector<5>(0.0, density.velocity, density.scale, density.scale, density.heading).asDiagonal();
+    Matrix<5> Q = Matrix<5>::Zero();
+    Q(1, 1) = density.velocity;
+    Q(2, 2) = Q(3, 3) = density.scale;
+    Q(4, 4) = density.heading;
+    return Q;
   }
 
   [[nodiscard]] State propagate(const State& x, const Control&, double dt) const {
@@ -92,7 +100,7 @@ struct PlanarMotion {
   // In continuous time.
   [[nodiscard]] State rate(const State& x, const Control& u) const {
     State result = State::Zero();
-    result.head<2>() = u + x.segment<2>(2);
+    for (int i = 0; i < 2; ++i) result(i) = u(i) + x(i + 2);
     return result;
   }
   [[nodiscard]] Matrix<7> rate_jacobian(const State&, const Control&) const {
@@ -101,14 +109,16 @@ struct PlanarMotion {
     return F;
   }
   [[nodiscard]] Matrix<7> spectral_density(const State&, const Control&) const {
-    Vector<7> q;
-    q << 0.0, 0.0, density.velocity, density.velocity, density.scale, density.scale, density.heading;
-    return q.asDiagonal();
+    Matrix<7> Q = Matrix<7>::Zero();
+    Q(2, 2) = Q(3, 3) = density.velocity;
+    Q(4, 4) = Q(5, 5) = density.scale;
+    Q(6, 6) = density.heading;
+    return Q;
   }
 
   [[nodiscard]] State propagate(const State& x, const Control& u, double dt) const {
     State next = x;
-    next.head<2>() += (u + x.segment<2>(2)) * dt;
+    for (int i = 0; i < 2; ++i) next(i) += (u(i) + x(i + 2)) * dt;
     return next;
   }
   [[nodiscard]] Matrix<7> jacobian(const State&, const Control&, double dt) const {
@@ -163,9 +173,14 @@ struct PlanarPlacement {
     const double c = std::cos(heading + x(6)), s = std::sin(heading + x(6));
     Matrix<6, 7> J = Matrix<6, 7>::Zero();
     J(0, 0) = J(1, 1) = 1.0;
-    J.block<4, 1>(2, 4) << c, s, 0.0, 0.0;
-    J.block<4, 1>(2, 5) << 0.0, 0.0, -s, c;
-    J.block<4, 1>(2, 6) << -x(4) * s, x(4) * c, -x(5) * c, -x(5) * s;
+    J(2, 4) = c;
+    J(3, 4) = s;
+    J(4, 5) = -s;
+    J(5, 5) = c;
+    J(2, 6) = -x(4) * s;
+    J(3, 6) = x(4) * c;
+    J(4, 6) = -x(5) * c;
+    J(5, 6) = -x(5) * s;
     return J;
   }
 };
@@ -194,16 +209,22 @@ struct PatchSensor {
   [[nodiscard]] Matrix<dynamic, State::RowsAtCompileTime> jacobian(const State& x) const {
     PatchSamples f;
     sample_patch(*map, shape, where.placement(x), f);
-    Matrix<dynamic, 6> w(static_cast<Eigen::Index>(shape.size()), 6);
+    constexpr int n = State::RowsAtCompileTime;
+    const Matrix<6, n> J = where.jacobian(x);
+    Matrix<dynamic, n> H(static_cast<Eigen::Index>(shape.size()), n);
     for (std::size_t i = 0; i < shape.size(); ++i) {
       const double a = shape.a(i), b = shape.b(i), fx = f.dx[i], fy = f.dy[i];
-      w.row(static_cast<Eigen::Index>(i)) << fx, fy, a * fx, a * fy, b * fx, b * fy;
+      for (int j = 0; j < n; ++j)
+        H(static_cast<Eigen::Index>(i), j) =
+            fx * (J(0, j) + a * J(2, j) + b * J(4, j)) + fy * (J(1, j) + a * J(3, j) + b * J(5, j));
     }
-    return w * where.jacobian(x);
+    return H;
   }
   [[nodiscard]] Matrix<dynamic> noise(const State&) const {
     const auto q = static_cast<Eigen::Index>(shape.size());
-    return variance * Matrix<dynamic>::Identity(q, q);
+    Matrix<dynamic> R = Matrix<dynamic>::Zero(q, q);
+    for (Eigen::Index i = 0; i < q; ++i) R(i, i) = variance;
+    return R;
   }
 };
 
