@@ -101,7 +101,7 @@ PatchUpdate PatchFilter::update(Gaussian<typename Placement::State>& belief, con
   if (!root.good()) return result;
   const Matrix<n>& L = root.lower();
   Vector<n> u;
-  Matrix<n> A;
+  Matrix<n> A = Matrix<n>::Zero();  // gcc 12 does not see that there is an iteration
   const auto linearise = [&](const typename Placement::State& x, PatchGram& frame) {
     return linearisation().gram(map, shape, where.placement(x), z, noise, scratch, frame);
   };
