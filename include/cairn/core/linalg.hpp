@@ -105,6 +105,22 @@ template <int R, int C, class S>
   return result;
 }
 
+/// The R x C part of a matrix that begins at this row and column.
+template <int R, int C, int Rows, int Columns, class S>
+[[nodiscard]] Matrix<R, C, S> part_of(const Matrix<Rows, Columns, S>& from, int row, int column) {
+  Matrix<R, C, S> part;
+  for (int j = 0; j < C; ++j)
+    for (int i = 0; i < R; ++i) part(i, j) = from(row + i, column + j);
+  return part;
+}
+
+/// Writes `part` into a matrix from this row and column on.
+template <int Rows, int Columns, int R, int C, class S>
+void put(Matrix<Rows, Columns, S>& to, int row, int column, const Matrix<R, C, S>& part) {
+  for (int j = 0; j < C; ++j)
+    for (int i = 0; i < R; ++i) to(row + i, column + j) = part(i, j);
+}
+
 /// Whether every number is finite.
 template <class Derived>
 [[nodiscard]] bool all_finite(const Eigen::DenseBase<Derived>& a) {

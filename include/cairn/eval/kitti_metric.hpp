@@ -87,20 +87,15 @@ std::optional<KittiError> kitti_error_over(const std::vector<double>& distances,
   return result;
 }
 
-/// A^-1 B of two printed poses, the inverse by transposing.
-inline KittiRow relative(const KittiRow& a, const KittiRow& b) {
-  KittiRow result;
-  for (int j = 0; j < 4; ++j)
-    for (int i = 0; i < 3; ++i) {
-      result(i, j) = 0;
-      for (int k = 0; k < 3; ++k) result(i, j) += a(k, i) * (j < 3 ? b(k, j) : b(k, 3) - a(k, 3));
-    }
-  return result;
+[[nodiscard]] inline Vector<3> position(const KittiRow& row) {
+  return part_of<3, 1>(row, 0, 3);
 }
 
-/// Length of the position less that of `from`.
-[[nodiscard]] inline double distance(const KittiRow& row, const KittiRow& from = KittiRow::Zero()) {
-  return Vector<3>(row(0, 3) - from(0, 3), row(1, 3) - from(1, 3), row(2, 3) - from(2, 3)).norm();
+/// A^-1 B of two printed poses, the inverse by transposing.
+inline KittiRow relative(const KittiRow& a, const KittiRow& b) {
+  KittiRow moved = b;
+  put(moved, 0, 3, Vector<3>(position(b) - position(a)));
+  return transposed_product(part_of<3, 3>(a, 0, 0), moved);
 }
 
 }  // namespace detail
@@ -136,12 +131,12 @@ inline KittiRow relative(const KittiRow& a, const KittiRow& b) {
   CAIRN_EXPECTS(truth.size() == estimate.size(), "kitti_error needs one estimate for each true pose");
   std::vector<double> distances(truth.size(), 0.0);
   for (std::size_t i = 1; i < truth.size(); ++i)
-    distances[i] = distances[i - 1] + detail::distance(truth[i], truth[i - 1]);
+    distances[i] = distances[i - 1] + (detail::position(truth[i]) - detail::position(truth[i - 1])).norm();
   return detail::kitti_error_over(distances, options, [&](std::size_t i, std::size_t j) {
     const KittiRow E =
         detail::relative(detail::relative(estimate[i], estimate[j]), detail::relative(truth[i], truth[j]));
     const double cosine = 0.5 * (E(0, 0) + E(1, 1) + E(2, 2) - 1.0);
-    return std::pair(detail::distance(E), std::acos(std::clamp(cosine, -1.0, 1.0)));
+    return std::pair(detail::position(E).norm(), std::acos(std::clamp(cosine, -1.0, 1.0)));
   });
 }
 

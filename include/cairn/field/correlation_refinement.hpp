@@ -153,11 +153,7 @@ std::optional<RefinedPlacement> refined_placement(const Map& map, const PatchSha
     const Cholesky<5> factor(normal);
     if (!factor.good() || !(factor.least_share() > 1e-13)) return std::nullopt;
     const Vector<5> step = factor.solve(gradient);
-    const Matrix<5> covariance = factor.inverse();
-    result.emplace();
-    result->placement = at.placement;
-    for (int j = 0; j < 2; ++j)
-      for (int i = 0; i < 2; ++i) result->covariance(i, j) = covariance(i, j);
+    result = RefinedPlacement{at.placement, part_of<2, 2>(factor.inverse(), 0, 0)};
     if (step.dot(product(normal, step)) < small * small) break;
     theta += step;
   }

@@ -131,10 +131,8 @@ private:
       if (!eliminate(all, 7, value_diagonal)) return false;
       result.gain = 1.0 + excess;
     }
-    for (int j = 0; j < 6; ++j) {
-      for (int i = 0; i < 6; ++i) result.information(i, j) = result.gain * result.gain * all(i, j);
-      result.gradient(j) = result.gain * all(j, 8);
-    }
+    result.information = (result.gain * result.gain) * part_of<6, 6>(all, 0, 0);
+    result.gradient = result.gain * part_of<6, 1>(all, 0, 8);
     result.squares = all(8, 8);
     return true;
   }

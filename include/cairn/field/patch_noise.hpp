@@ -96,12 +96,12 @@ public:
     const int m = across.above(negligible * variance / (map_variance * along.value(0)));
     along_.resize(n, shape.along());
     across_.resize(shape.across(), m);
-    gain_.resize(n, m);
+    root_gain_.resize(n, m);
     for (int j = 0; j < m; ++j) {
       for (int k = 0; k < shape.across(); ++k) across_(k, j) = across.vector(j)[k];
       for (int i = 0; i < n; ++i) {
         const double both = map_variance * along.value(i) * across.value(j);
-        gain_(i, j) = both / (variance + both);  // G of (2)
+        root_gain_(i, j) = std::sqrt(both / (variance + both));
       }
     }
     for (int i = 0; i < n; ++i)
@@ -110,7 +110,7 @@ public:
   }
 
   [[nodiscard]] double variance() const noexcept { return variance_; }
-  [[nodiscard]] bool white() const noexcept { return gain_.size() == 0; }
+  [[nodiscard]] bool white() const noexcept { return root_gain_.size() == 0; }
 
   /// columns^T C^-1 columns for columns of one number a sample (the frame's order). Where samples are missing
   /// (rows of zeros, complete = false), a correlated C is replaced by its largest eigenvalue, which can only
@@ -161,12 +161,11 @@ private:
   template <int K>
   void subtract_modes(const Matrix<dynamic, K>& columns, Matrix<K>& result) const {
     Matrix<dynamic> lattice(along_.cols(), across_.rows());
-    Matrix<dynamic, K> modes(gain_.size(), K);
+    Matrix<dynamic, K> modes(root_gain_.size(), K);
     for (int k = 0; k < K; ++k) {
       std::copy_n(columns.data() + k * columns.rows(), lattice.size(), lattice.data());
       const Matrix<dynamic> mode = product(product(along_, lattice), across_);
-      for (Eigen::Index i = 0; i < gain_.size(); ++i)
-        modes(i, k) = mode.data()[i] * std::sqrt(gain_.data()[i]);
+      for (Eigen::Index i = 0; i < mode.size(); ++i) modes(i, k) = mode.data()[i] * root_gain_.data()[i];
     }
     Matrix<K> squares = Matrix<K>::Zero();
     detail::add_squares(modes, squares);
@@ -175,10 +174,10 @@ private:
   }
 
   double variance_;
-  double bound_;            // largest eigenvalue of C
-  Matrix<dynamic> along_;   // U^T, rows that matter
-  Matrix<dynamic> across_;  // V, columns that matter
-  Matrix<dynamic> gain_;    // G, along x across
+  double bound_;               // largest eigenvalue of C
+  Matrix<dynamic> along_;      // U^T, rows that matter
+  Matrix<dynamic> across_;     // V, columns that matter
+  Matrix<dynamic> root_gain_;  // root of G, along x across
 };
 
 }  // namespace cairn::inline CAIRN_ABI

@@ -158,7 +158,7 @@ private:
     const Innovation z = innovation(pair);
     if (!(z.value * z.value <= options_.gate * options_.gate * z.variance)) return false;
     state_ += z.PHt * (z.value / z.variance);
-    add_outer(covariance_, z.PHt, -1 / z.variance);
+    covariance_ -= product_transposed(z.PHt, z.PHt) / z.variance;
     return true;
   }
 
@@ -188,7 +188,7 @@ private:
       for (const Rays& pair : rays) {
         const Innovation z = innovation(pair);
         const double weight = 1 / (1 + squared(z.value / scale));
-        add_outer(information, z.H, weight);
+        information += weight * product_transposed(z.H, z.H);
         gradient += (weight * z.value) * z.H;
       }
       state_ += Cholesky<5>(information).solve(gradient);
@@ -205,14 +205,6 @@ private:
   }
 
   [[nodiscard]] static double squared(double value) noexcept { return value * value; }
-
-  /// to += weight v v^T
-  static void add_outer(Matrix<5>& to, const Vector<5>& v, double weight) noexcept {
-    for (int j = 0; j < 5; ++j) {
-      const double factor = weight * v(j);
-      for (int i = 0; i < 5; ++i) to(i, j) += v(i) * factor;
-    }
-  }
 
   RigCorrection correction_;
   CalibrationDriftOptions options_;

@@ -23,7 +23,6 @@
 #include <limits>
 #include <optional>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include <cairn/core/cholesky.hpp>
@@ -115,10 +114,8 @@ public:
     if (!all_finite(d)) return std::nullopt;
     for (Track& track : tracks_)
       track.point += track.elimination.solve(Vector<3>(track.gradient - product(track.coupling, d)));
-    Vector<6> motion_step;
-    for (int i = 0; i < 6; ++i) motion_step(i) = d(i);
-    for (int i = 0; i < 5; ++i) state_(i) += d(6 + i);
-    motion_ = retract(motion_, motion_step);
+    motion_ = retract(motion_, part_of<6, 1>(d, 0, 0));
+    state_ += part_of<5, 1>(d, 6, 0);
     return d.dot(g);
   }
 
@@ -130,13 +127,10 @@ public:
     Vector<shared> g;
     gather(state_, Matrix<5>::Zero(), gate, std::numeric_limits<double>::infinity(), H, g);
     H *= efficiency;
-    add_to_correction(H, information);
+    put(H, 6, 6, Matrix<5>(part_of<5, 5>(H, 6, 6) + information));
     const Cholesky<shared> factor(H);
     if (!factor.good()) return std::nullopt;
-    const Matrix<shared> inverse = factor.inverse();
-    Matrix<5> result;
-    for (int j = 0; j < 5; ++j)
-      for (int i = 0; i < 5; ++i) result(i, j) = inverse(6 + i, 6 + j);
+    const Matrix<5> result = part_of<5, 5>(factor.inverse(), 6, 6);
     if (!all_finite(result)) return std::nullopt;
     return result;
   }
@@ -181,50 +175,31 @@ private:
         by_point = R_after;
       }
       const Vector<3> arm = p - baseline, q = transposed_product(R, arm);
-      const auto left = whitened(track.views[2 * moment], p);
-      const auto right = whitened(track.views[2 * moment + 1], q);
-      if (!left || !right) return std::nullopt;
-      const Matrix<2, 3> right_by_p = product_transposed(right->second, R);
+      constexpr double nearest = 1e-6;
+      if (!(p(2) > nearest && q(2) > nearest)) return std::nullopt;
+      const WhitenedResidual left = whitened(track.views[2 * moment], p);
+      const WhitenedResidual right = whitened(track.views[2 * moment + 1], q);
+      const Matrix<2, 3> right_by_p = product_transposed(right.J_point, R);
       const int row = moment == 0 ? 0 : 4;
-      put(left->first, row, 0, result.residual);
-      put(right->first, row + 2, 0, result.residual);
-      put(product(left->second, by_point), row, 0, result.J_point);
-      put(product(right_by_p, by_point), row + 2, 0, result.J_point);
+      put(result.residual, row, 0, left.residual);
+      put(result.residual, row + 2, 0, right.residual);
+      put(result.J_point, row, 0, product(left.J_point, by_point));
+      put(result.J_point, row + 2, 0, product(right_by_p, by_point));
       if (moment == 1) {  // d p / d motion = [-I, skew(p)]
-        put<2, 3>(-left->second, row, 0, result.J_shared);
-        put(product(left->second, skew(p)), row, 3, result.J_shared);
-        put<2, 3>(-right_by_p, row + 2, 0, result.J_shared);
-        put(product(right_by_p, skew(p)), row + 2, 3, result.J_shared);
+        put(result.J_shared, row, 0, Matrix<2, 3>(-left.J_point));
+        put(result.J_shared, row, 3, product(left.J_point, skew(p)));
+        put(result.J_shared, row + 2, 0, Matrix<2, 3>(-right_by_p));
+        put(result.J_shared, row + 2, 3, product(right_by_p, skew(p)));
       }
-      put(product(right->second, skew(q)), row + 2, 6, result.J_shared);
-      put<2, 2>(-rig_.nominal().baseline() * product(right->second, by_direction), row + 2, 9,
-                result.J_shared);
+      put(result.J_shared, row + 2, 6, product(right.J_point, skew(q)));
+      put(result.J_shared, row + 2, 9,
+          Matrix<2>(-rig_.nominal().baseline() * product(right.J_point, by_direction)));
     }
     return result;
   }
 
-  /// Copies `part` into `to` from this row and column on.
-  template <int R, int C, int Rows, int Columns>
-  static void put(const Matrix<R, C>& part, int row, int column, Matrix<Rows, Columns>& to) noexcept {
-    for (int j = 0; j < C; ++j)
-      for (int i = 0; i < R; ++i) to(row + i, column + j) = part(i, j);
-  }
-
-  /// Adds to what the equations say of the correction.
-  static void add_to_correction(Matrix<shared>& H, const Matrix<5>& information) noexcept {
-    for (int j = 0; j < 5; ++j)
-      for (int i = 0; i < 5; ++i) H(6 + i, 6 + j) += information(i, j);
-  }
-
-  /// Residual of a view and d predicted / d point, both whitened.
-  [[nodiscard]] static std::optional<std::pair<Vector<2>, Matrix<2, 3>>> whitened(const View& view,
-                                                                                  const Vector<3>& p) {
-    if (!(p(2) > 1e-6)) return std::nullopt;
-    const double x = p(0) / p(2), y = p(1) / p(2);
-    Matrix<2, 3> J;
-    J << 1 / p(2), 0, -x / p(2), 0, 1 / p(2), -y / p(2);
-    const Vector<2> residual(view.observed(0) - x, view.observed(1) - y);
-    return std::pair(product(view.whitening, residual), product(view.whitening, J));
+  [[nodiscard]] static WhitenedResidual whitened(const View& view, const Vector<3>& p) {
+    return whitened_residual(view.observed, view.whitening, p);
   }
 
   /// Normal equations of motion and correction with the points eliminated.
@@ -232,9 +207,8 @@ private:
               Matrix<shared>& H, Vector<shared>& g) {
     H.setZero();
     g.setZero();
-    add_to_correction(H, information);
-    const Vector<5> from_mean = mean - state_;
-    put(product(information, from_mean), 6, 0, g);
+    put(H, 6, 6, information);
+    put(g, 6, 0, product(information, Vector<5>(mean - state_)));
     const Matrix<3> R = rig_.rotation(state_).matrix();
     const Vector<3> baseline = rig_.nominal().baseline() * rig_.direction(state_);
     for (Track& track : tracks_) {

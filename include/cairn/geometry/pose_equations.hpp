@@ -109,22 +109,15 @@ public:
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) m(i, 3 + j) = m(3 + j, i) = sum(coupling_[i][j]);
     for (int i = 0; i < 6; i += 3)
-      for (int j = 0; j < 6; j += 3) {
-        Matrix<3> part;
-        for (int k = 0; k < 9; ++k) part(k % 3, k / 3) = m(i + k % 3, j + k / 3);
-        part = transposed_product(R, product(part, R));
-        for (int k = 0; k < 9; ++k) m(i + k % 3, j + k / 3) = part(k % 3, k / 3);
-      }
+      for (int j = 0; j < 6; j += 3) put(m, i, j, transposed_product(R, product(part_of<3, 3>(m, i, j), R)));
     return symmetrised(m);
   }
 
   [[nodiscard]] Vector<6> gradient(const Matrix<3>& R) const noexcept {
-    Vector<3> g[2];
-    for (int i = 0; i < 6; ++i) g[i / 3](i % 3) = sum(gradient_[i]);
-    for (Vector<3>& part : g) part = transposed_product(R, part);
-    Vector<6> result;
-    result << g[0](0), g[0](1), g[0](2), g[1](0), g[1](1), g[1](2);
-    return result;
+    Vector<6> g;
+    for (int i = 0; i < 6; ++i) g(i) = sum(gradient_[i]);
+    for (int i = 0; i < 6; i += 3) put(g, i, 0, transposed_product(R, part_of<3, 1>(g, i, 0)));
+    return g;
   }
 
 private:

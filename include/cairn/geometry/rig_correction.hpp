@@ -30,12 +30,9 @@ public:
     const int least = std::abs(u1(1)) < 0.9 ? 1 : 2;
     Vector<3> u2 = Vector<3>::Unit(least) - u1(least) * u1;
     u2 /= u2.norm();
-    const Vector<3> u3 = detail::cross<double>(u1, u2);
-    for (int i = 0; i < 3; ++i) {
-      axes_(i, 0) = u1(i);
-      axes_(i, 1) = u2(i);
-      axes_(i, 2) = u3(i);
-    }
+    put(axes_, 0, 0, u1);
+    put(axes_, 0, 1, u2);
+    put(axes_, 0, 2, detail::cross<double>(u1, u2));
   }
 
   [[nodiscard]] const StereoRig& nominal() const noexcept { return nominal_; }
@@ -49,7 +46,7 @@ public:
 
   /// R of (1), from the right to the left camera.
   [[nodiscard]] SO3 rotation(const Vector<5>& state) const {
-    return nominal_.T_left_right.rotation() * SO3::exp(Vector<3>(state(0), state(1), state(2)));
+    return nominal_.T_left_right.rotation() * SO3::exp(part_of<3, 1>(state, 0, 0));
   }
 
   /// Unit vector along t of (1).
@@ -59,12 +56,7 @@ public:
   }
 
   /// d direction / d (t_y, t_z) to first order in them.
-  [[nodiscard]] Matrix<3, 2> direction_jacobian() const {
-    Matrix<3, 2> J;
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 2; ++j) J(i, j) = axes_(i, 1 + j);
-    return J;
-  }
+  [[nodiscard]] Matrix<3, 2> direction_jacobian() const { return part_of<3, 2>(axes_, 0, 1); }
 
 private:
   StereoRig nominal_;

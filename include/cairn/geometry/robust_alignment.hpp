@@ -172,15 +172,12 @@ private:
       moment -= transposed_product(lever, pull);
     }
     Equations e;  // J^T weight J and -J^T weight r, J of (1)
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) {
-        e.information(i, j) = translation(i, j);
-        e.information(i, 3 + j) = e.information(3 + j, i) = coupling(i, j);
-        e.information(3 + i, 3 + j) = rotation(i, j);
-      }
-      e.gradient(i) = force(i);
-      e.gradient(3 + i) = moment(i);
-    }
+    put(e.information, 0, 0, translation);
+    put(e.information, 0, 3, coupling);
+    put(e.information, 3, 0, transposed(coupling));
+    put(e.information, 3, 3, rotation);
+    put(e.gradient, 0, 0, force);
+    put(e.gradient, 3, 0, moment);
     e.information = symmetrised(e.information);
     return e;
   }

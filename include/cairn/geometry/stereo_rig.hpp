@@ -53,15 +53,10 @@ struct StereoRig {
     const auto r = right.project_with_jacobian(T_right_left * point);
     if (!l || !r) return std::nullopt;
     StereoPixelsWithJacobian result;
-    const Matrix<2, 3> J_right = product(r->J_point, T_right_left.rotation().matrix());
-    for (int i = 0; i < 2; ++i) {
-      result.pixels(i) = l->pixel(i);
-      result.pixels(2 + i) = r->pixel(i);
-      for (int j = 0; j < 3; ++j) {
-        result.J_point(i, j) = l->J_point(i, j);
-        result.J_point(2 + i, j) = J_right(i, j);
-      }
-    }
+    put(result.pixels, 0, 0, l->pixel);
+    put(result.pixels, 2, 0, r->pixel);
+    put(result.J_point, 0, 0, l->J_point);
+    put(result.J_point, 2, 0, product(r->J_point, T_right_left.rotation().matrix()));
     return result;
   }
 

@@ -83,6 +83,23 @@ struct PixelRay {
   return ray;
 }
 
+/// How far a view of a point is from where it is predicted, and the derivative of the prediction by the
+/// point.
+struct WhitenedResidual {
+  Vector<2> residual;
+  Matrix<2, 3> J_point;
+};
+
+/// Of normalised coordinates, both times `whitening` (d pixel / d normalised over sigma); the point in the
+/// camera's frame and in front of it.
+[[nodiscard]] inline WhitenedResidual whitened_residual(const Vector<2>& observed, const Matrix<2>& whitening,
+                                                        const Vector<3>& p) {
+  const double x = p(0) / p(2), y = p(1) / p(2);
+  Matrix<2, 3> J;
+  J << 1 / p(2), 0, -x / p(2), 0, 1 / p(2), -y / p(2);
+  return {product(whitening, Vector<2>(observed(0) - x, observed(1) - y)), product(whitening, J)};
+}
+
 /// Feet of the common perpendicular of two rays, (1), and their derivatives by both unit directions.
 struct Feet {
   double a, b;                   // distances of the feet from the cameras
@@ -194,8 +211,8 @@ private:
                                        double sigma_right) const {
     const Vector<3> p = result.point, offset = p - baseline_, q = transposed_product(R_left_right_, offset);
     if (!(p(2) > 0 && q(2) > 0)) return false;
-    const Whitened left = whitened(l, p, sigma_left);
-    Whitened right = whitened(r, q, sigma_right);
+    const auto left = detail::whitened_residual(l.normalised, l.J_pixel / sigma_left, p);
+    auto right = detail::whitened_residual(r.normalised, r.J_pixel / sigma_right, q);
     right.J_point = product_transposed(right.J_point, R_left_right_);
     Matrix<3> information = transposed_product(left.J_point, left.J_point);
     add_transposed_product(information, right.J_point, right.J_point);
@@ -206,20 +223,6 @@ private:
     result.point += factor.solve(gradient);
     result.covariance = factor.inverse();
     return true;
-  }
-
-  struct Whitened {
-    Matrix<2, 3> J_point;
-    Vector<2> residual;
-  };
-
-  // One camera's residual and the derivative of its prediction by the point, in its frame.
-  [[nodiscard]] static Whitened whitened(const NormalisedWithJacobian& n, const Vector<3>& p, double sigma) {
-    const Matrix<2> W = n.J_pixel / sigma;
-    const double x = p(0) / p(2), y = p(1) / p(2);
-    Matrix<2, 3> J;
-    J << 1 / p(2), 0, -x / p(2), 0, 1 / p(2), -y / p(2);
-    return {product(W, J), product(W, Vector<2>(n.normalised(0) - x, n.normalised(1) - y))};
   }
 
   PinholeCamera left_, right_;

@@ -42,23 +42,16 @@ public:
       if (!(m(3, i) == S(0)) || !(m(i, 3) - m(i, 3) == S(0)))
         raise("SE3::from_matrix: expected a finite translation and the last row 0 0 0 1");
     if (!(m(3, 3) == S(1))) raise("SE3::from_matrix: expected the last row 0 0 0 1");
-    Matrix<3, 3, S> rotation;
-    for (int i = 0; i < 9; ++i) rotation(i / 3, i % 3) = m(i / 3, i % 3);
-    return BasicSE3(BasicSO3<S>::from_matrix(rotation, tolerance), Vector<3, S>(m(0, 3), m(1, 3), m(2, 3)));
+    return BasicSE3(BasicSO3<S>::from_matrix(part_of<3, 3>(m, 0, 0), tolerance), part_of<3, 1>(m, 0, 3));
   }
 
   [[nodiscard]] const BasicSO3<S>& rotation() const noexcept { return rotation_; }
   [[nodiscard]] const Vector<3, S>& translation() const noexcept { return translation_; }
 
   [[nodiscard]] Matrix<4, 4, S> matrix() const {
-    const Matrix<3, 3, S> rotation = rotation_.matrix();
-    Matrix<4, 4, S> m;
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) m(i, j) = rotation(i, j);
-      m(i, 3) = translation_(i);
-      m(3, i) = S(0);
-    }
-    m(3, 3) = S(1);
+    Matrix<4, 4, S> m = Matrix<4, 4, S>::Identity();
+    put(m, 0, 0, rotation_.matrix());
+    put(m, 0, 3, translation_);
     return m;
   }
 
@@ -84,7 +77,8 @@ public:
     const Vector<3, S> omega = rotation_.log();
     const Vector<3, S> rho = product(BasicSO3<S>::left_jacobian_inverse(omega), translation_);
     Tangent d;
-    d << rho(0), rho(1), rho(2), omega(0), omega(1), omega(2);
+    put(d, 0, 0, rho);
+    put(d, 3, 0, omega);
     return d;
   }
 
@@ -116,18 +110,15 @@ public:
 private:
   [[nodiscard]] static Matrix<6, 6, S> upper_triangular(const Matrix<3, 3, S>& diagonal,
                                                         const Matrix<3, 3, S>& corner) {
-    Matrix<6, 6, S> m;
-    for (int j = 0; j < 3; ++j)
-      for (int i = 0; i < 3; ++i) {
-        m(i, j) = m(3 + i, 3 + j) = diagonal(i, j);
-        m(i, 3 + j) = corner(i, j);
-        m(3 + i, j) = S(0);
-      }
+    Matrix<6, 6, S> m = Matrix<6, 6, S>::Zero();
+    put(m, 0, 0, diagonal);
+    put(m, 0, 3, corner);
+    put(m, 3, 3, diagonal);
     return m;
   }
 
-  [[nodiscard]] static Vector<3, S> translation_of(const Tangent& d) { return {d(0), d(1), d(2)}; }
-  [[nodiscard]] static Vector<3, S> rotation_of(const Tangent& d) { return {d(3), d(4), d(5)}; }
+  [[nodiscard]] static Vector<3, S> translation_of(const Tangent& d) { return part_of<3, 1>(d, 0, 0); }
+  [[nodiscard]] static Vector<3, S> rotation_of(const Tangent& d) { return part_of<3, 1>(d, 3, 0); }
 
   // Q(rho, w) of (3).
   [[nodiscard]] static Matrix<3, 3, S> coupling(const Tangent& d) {
