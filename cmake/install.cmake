@@ -9,10 +9,14 @@ include(CMakePackageConfigHelpers)
 
 # Headers alone: nothing depends on the architecture, so everything else goes to share.
 set(config_folder "${CMAKE_INSTALL_DATADIR}/cmake/cairn")
-install(TARGETS cairn EXPORT cairn_targets
-  FILE_SET HEADERS DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}"
-  INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
-install(EXPORT cairn_targets NAMESPACE cairn:: DESTINATION "${config_folder}" FILE cairn-targets.cmake)
+install(DIRECTORY "${PROJECT_SOURCE_DIR}/include/cairn" DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}" FILES_MATCHING PATTERN "*.hpp")
+# Two sets, so that the one that names Eigen3::Eigen is read only where that is.
+install(TARGETS cairn_index EXPORT cairn_index_targets INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
+install(TARGETS cairn EXPORT cairn_targets)
+foreach(set IN ITEMS cairn_index cairn)
+  string(REPLACE "_" "-" file "${set}-targets.cmake")
+  install(EXPORT ${set}_targets NAMESPACE cairn:: DESTINATION "${config_folder}" FILE "${file}")
+endforeach()
 
 configure_package_config_file(cmake/cairn-config.cmake.in "${PROJECT_BINARY_DIR}/cairn-config.cmake"
   INSTALL_DESTINATION "${config_folder}")
@@ -22,6 +26,8 @@ write_basic_package_version_file("${PROJECT_BINARY_DIR}/cairn-config-version.cma
 install(FILES "${PROJECT_BINARY_DIR}/cairn-config.cmake" "${PROJECT_BINARY_DIR}/cairn-config-version.cmake"
   DESTINATION "${config_folder}")
 
-configure_file(cmake/cairn.pc.in "${PROJECT_BINARY_DIR}/cairn.pc" @ONLY)
-install(FILES "${PROJECT_BINARY_DIR}/cairn.pc" DESTINATION "${CMAKE_INSTALL_DATADIR}/pkgconfig")
+foreach(package IN ITEMS cairn cairn-index)
+  configure_file(cmake/${package}.pc.in "${PROJECT_BINARY_DIR}/${package}.pc" @ONLY)
+  install(FILES "${PROJECT_BINARY_DIR}/${package}.pc" DESTINATION "${CMAKE_INSTALL_DATADIR}/pkgconfig")
+endforeach()
 install(FILES LICENSE DESTINATION "${CMAKE_INSTALL_DATADIR}/licenses/cairn")

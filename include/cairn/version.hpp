@@ -8,6 +8,13 @@
 /// names differ through the inline namespace, so neither silently replaces the other's inline functions.
 #pragma once
 
+// What an older compiler says of the headers themselves would name their innards, not its age.
+#if defined(__clang__) ? __clang_major__ < 14 : !defined(__GNUC__) || __GNUC__ < 11
+#error "cairn needs gcc 11, clang 14 or a later one (C++20 and GNU vector extensions)"
+#elif __cplusplus < 202002L
+#error "cairn needs C++20: -std=c++20"
+#endif
+
 #define CAIRN_VERSION_MAJOR 0
 #define CAIRN_VERSION_MINOR 1
 #define CAIRN_VERSION_PATCH 0

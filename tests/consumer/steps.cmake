@@ -14,7 +14,7 @@ endfunction()
 
 # Installs cairn into ${prefix} the way a packager does: nothing of its own is built.
 function(install_cairn)
-  configure("${source}" "${work}/cairn" -D CAIRN_BUILD_TESTS=OFF -D CAIRN_BUILD_EXAMPLES=OFF)
+  configure("${source}" "${work}/cairn" -D CAIRN_BUILD_TESTS=OFF -D CAIRN_BUILD_EXAMPLES=OFF ${ARGN})
   run("${CMAKE_COMMAND}" --install "${work}/cairn" --prefix "${prefix}")
 endfunction()
 

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 #include <array>
+#include <cmath>
 
 #include <doctest/doctest.h>
 
@@ -36,6 +37,15 @@ TEST_SUITE("random") {
     CHECK(chi_square < cairn::chi_square_quantile(0.9999, 6));
     CHECK(random.below(0) == 0);
     CHECK(random.below(1) == 0);
+  }
+
+  TEST_CASE("random: below() has no bias where the draws are not a multiple of the count") {
+    // Remainders of 2^64 draws by 3 * 2^62 would fall into the first third half of the time.
+    cairn::Random random(7);
+    int first_third = 0;
+    constexpr int draws = 9000;
+    for (int i = 0; i < draws; ++i) first_third += random.below(3ULL << 62U) < 1ULL << 62U ? 1 : 0;
+    CHECK(std::abs(first_third - draws / 3) < 4 * std::sqrt(draws * 2.0 / 9.0));
   }
 
   TEST_CASE("random: normal() has the moments of a normal") {

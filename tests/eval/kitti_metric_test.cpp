@@ -8,10 +8,12 @@
 
 #include <doctest/doctest.h>
 
+#include <cairn/core/random.hpp>
 #include <cairn/eval/kitti_metric.hpp>
 #include <cairn/io/trajectory.hpp>
 
 #include "support/data.hpp"
+#include "support/random.hpp"
 
 using cairn::PosePair;
 using cairn::SE3;
@@ -79,6 +81,25 @@ TEST_SUITE("kitti_metric") {
     REQUIRE(error.has_value());
     CHECK(error->by_length[0].rotation_degrees_per_100m() == doctest::Approx(0.25 * 201 / 200).epsilon(1e-7));
     CHECK(error->by_length[1].rotation_degrees_per_100m() == doctest::Approx(0.25 * 401 / 400).epsilon(1e-7));
+  }
+
+  TEST_CASE("kitti_metric: a winding drive has the figures of the definition by plain loops") {
+    cairn::Random random(cairn_test::seed());
+    std::vector<PosePair> pairs(1);
+    for (std::size_t i = 1; i < 1300; ++i) {
+      const SE3 step(SO3::exp(Vector<3>(0, 0.05 * random.normal(), 0)),
+                     Vector<3>(0, 0, random.uniform(0.5, 1.5)));
+      const SE3 slip(SO3::exp(Vector<3>(0, 1e-3 * random.normal(), 0)),
+                     Vector<3>(0, 0, 0.02 * random.normal()));
+      pairs.push_back(
+          {static_cast<double>(i), pairs.back().truth * step, pairs.back().estimate * step * slip});
+    }
+    const auto error = cairn::kitti_error(pairs);
+    REQUIRE(error.has_value());
+    const cairn::SegmentError oracle = by_definition(pairs);
+    CHECK(error->overall.segments == oracle.segments);
+    CHECK(error->overall.translation == doctest::Approx(oracle.translation).epsilon(1e-9));
+    CHECK(error->overall.rotation == doctest::Approx(oracle.rotation).epsilon(1e-6));
   }
 
   TEST_CASE("kitti_metric: a path shorter than every length has no figure") {

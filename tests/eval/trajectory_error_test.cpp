@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <Eigen/LU>
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
@@ -146,6 +147,35 @@ TEST_SUITE("trajectory_error") {
     CHECK(tens->rotation.largest == doctest::Approx(0.1).epsilon(1e-9));
     CHECK_FALSE(cairn::relative_error(pairs, {.delta = 101}).has_value());
     CHECK_FALSE(cairn::relative_error(pairs, {.delta = 500, .unit = cairn::DeltaUnit::metres}).has_value());
+  }
+
+  TEST_CASE("relative_error: poses anywhere have the error of the definition in matrices") {
+    cairn::Random random(cairn_test::seed());
+    std::vector<PosePair> pairs = random_pairs(random, 12);
+    for (PosePair& pair : pairs) pair.estimate = random_pose(random, 5.0);
+    double squares = 0, angles = 0;
+    for (std::size_t i = 0; i + 3 < pairs.size(); ++i) {
+      const cairn::Matrix<4> truth = pairs[i].truth.matrix().inverse() * pairs[i + 3].truth.matrix();
+      const cairn::Matrix<4> estimate = pairs[i].estimate.matrix().inverse() * pairs[i + 3].estimate.matrix();
+      const cairn::Matrix<4> E = truth.inverse() * estimate;
+      squares += E.topRightCorner<3, 1>().squaredNorm();
+      angles += std::acos(0.5 * (E.topLeftCorner<3, 3>().trace() - 1.0));
+    }
+    const auto error = cairn::relative_error(pairs, {.delta = 3, .all_pairs = true});
+    REQUIRE(error.has_value());
+    CHECK(error->translation.sum_of_squares == doctest::Approx(squares).epsilon(1e-9));
+    CHECK(error->rotation.mean == doctest::Approx(angles / 9).epsilon(1e-6));
+  }
+
+  TEST_CASE("associate: the earlier of two equally near, the first of two that want the same") {
+    const Trajectory seconds{{0.0, SE3()}, {1.0, SE3(SO3(), Vector<3>(1, 0, 0))}};
+    const Trajectory between{{0.5, SE3()}};
+    const cairn::AssociationOptions wide{.largest_difference = 1};
+    REQUIRE(cairn::associate(seconds, between, wide).size() == 1);
+    CHECK(cairn::associate(seconds, between, wide)[0].truth.translation()(0) == 0.0);
+    const auto same = cairn::associate(between, seconds, wide);
+    REQUIRE(same.size() == 1);
+    CHECK(same[0].time == 0.0);
   }
 
   TEST_CASE("associate: the nearest in time, one to one, within the limit") {

@@ -129,6 +129,8 @@ TEST_SUITE("camera") {
   TEST_CASE("PinholeCamera: knows its image, with pixel centres at whole numbers") {
     const PinholeCamera camera(cushion);
     CHECK(camera.contains(Vector<2>(0, 0)));
+    CHECK(camera.contains(Vector<2>(-0.4, -0.4)));
+    CHECK_FALSE(camera.contains(Vector<2>(-0.6, 0)));
     CHECK(camera.contains(Vector<2>(639.4, 479.4)));
     CHECK_FALSE(camera.contains(Vector<2>(639.6, 0)));
     CHECK_FALSE(camera.contains(Vector<2>(0, 0), 10));

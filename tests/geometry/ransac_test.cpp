@@ -111,6 +111,19 @@ TEST_SUITE("ransac") {
     }
   }
 
+  TEST_CASE("ransac: the answer is one that least squares on its own inliers does not improve by a percent") {
+    cairn::Random random(cairn_test::seed());
+    for (std::uint64_t seed = 0; seed < 20; ++seed) {
+      LineProblem problem = line_problem(70, 30, random);
+      shuffle(problem, random);
+      const auto result = cairn::ransac(problem, {.refinements = 20, .seed = seed});
+      REQUIRE(result.model.has_value());
+      LineProblem::Model again = *result.model;
+      REQUIRE(problem.refine(again));
+      CHECK(problem.score(again, 1e9).cost >= 0.99 * result.score.cost);
+    }
+  }
+
   TEST_CASE("ransac: the number of samples is the exact formula's") {
     // log(1 - 0.99) / log(1 - w^3 without replacement), w = 1/2 of 100: C(50,3)/C(100,3) = 0.121212
     CHECK(cairn::detail::samples_needed(50, 100, 3, 0.99, 1e9) ==

@@ -109,6 +109,47 @@ TEST_SUITE("triangulation") {
     CHECK(cairn::median(errors[2]) < 1.02 * cairn::median(errors[1]));
   }
 
+  TEST_CASE(
+      "triangulate: the covariance of midpoints is that of numeric derivatives, also for rays that miss") {
+    const cairn::StereoRig rig = cairn_test::unrectified_rig();
+    cairn::Random random(cairn_test::seed());
+    for (const TriangulationMethod method :
+         {TriangulationMethod::midpoint, TriangulationMethod::weighted_midpoint})
+      for (int run = 0; run < 20; ++run) {
+        Vector<4> x = *rig.project(cairn_test::visible_point(rig, random, 1, 3));
+        x(3) += 40;  // pixels: the rays pass each other far off
+        const cairn::TriangulationOptions options{
+            .method = method, .sigma_left = 0.5, .sigma_right = 1.5, .max_gap = 1e9};
+        const auto point = [&](const Vector<4>& at) {
+          return cairn::triangulate(rig, at.head<2>(), at.tail<2>(), options).point;
+        };
+        cairn::Matrix<3> covariance = cairn::Matrix<3>::Zero();
+        for (int k = 0; k < 4; ++k) {
+          Vector<4> up = x, down = x;
+          up(k) += 1e-3;
+          down(k) -= 1e-3;
+          const Vector<3> column = (k < 2 ? 0.5 : 1.5) * (point(up) - point(down)) / 2e-3;
+          covariance += column * column.transpose();
+        }
+        const Triangulation t = cairn::triangulate(rig, x.head<2>(), x.tail<2>(), options);
+        REQUIRE(t.good());
+        CHECK((t.covariance - covariance).norm() < 1e-5 * covariance.norm());
+      }
+  }
+
+  TEST_CASE("triangulate: a point in front of one camera and behind the other is none") {
+    // The right camera looks back past the left one: what lies ahead of the left has a line, but no ray,
+    // there.
+    const cairn::PinholeCamera camera;
+    const cairn::StereoRig rig{camera, camera, cairn::SE3(cairn::SO3::exp({0, 2.5, 0}), {1, 0, 0})};
+    const Vector<3> p(0.5, 0.1, 4), q = rig.T_left_right.inverse() * p;
+    REQUIRE(q(2) < 0);
+    for (const TriangulationMethod method : methods)
+      CHECK(
+          cairn::triangulate(rig, {p(0) / p(2), p(1) / p(2)}, {q(0) / q(2), q(1) / q(2)}, {.method = method})
+              .status == TriangulationStatus::behind);
+  }
+
   TEST_CASE("triangulate: says why there is no point") {
     const cairn::StereoRig rig = cairn_test::rectified_rig();
     const auto status = [&](const Vector<2>& left, const Vector<2>& right) {

@@ -125,6 +125,22 @@ TEST_SUITE("so3") {
     }
   }
 
+  TEST_CASE("SO3::from_matrix: keeps its digits where one component is all but everything") {
+    // Half turns about an axis, and some nearly: the other three components must not be divided by.
+    for (int axis = 0; axis < 4; ++axis)
+      for (int other = 0; other < 4; ++other)
+        for (const double small : {0.0, 1e-9, 1e-7, 1e-5, 1e-3}) {
+          double q[4] = {0, 0, 0, 0};
+          q[other] = small;
+          q[axis] = 1;
+          const SO3 R = SO3::from_quaternion(q[0], q[1], q[2], q[3]);
+          CAPTURE(axis);
+          CAPTURE(other);
+          CAPTURE(small);
+          CHECK((SO3::from_matrix(R.matrix()).inverse() * R).angle() < 2e-15);
+        }
+  }
+
   TEST_CASE("SO3: refuses what is no rotation") {
     Matrix<3> reflection = Matrix<3>::Identity();
     reflection(2, 2) = -1;

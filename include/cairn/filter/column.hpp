@@ -14,6 +14,7 @@
 #include <cstring>
 #include <utility>
 
+#include <cairn/core/shuffle.hpp>
 #include <cairn/filter/structure.hpp>
 #include <cairn/version.hpp>
 
@@ -69,11 +70,13 @@ template <class S, int W>
 using LaneOfWidth = typename RegisterOf<S, W* static_cast<int>(sizeof(S))>::type;
 
 /// Lane l of the result is number Pick{}(l) of a and b written one after the other.
-template <int W, class Pick, class Lane>
-[[gnu::always_inline]] inline auto shuffled(const Lane& a, const Lane& b) {
-  return [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
-    return __builtin_shufflevector(a, b, Pick{}(static_cast<int>(I))...);
+template <class S, int W, class Pick, class Lane>
+[[gnu::always_inline]] inline LaneOfWidth<S, W> shuffled(const Lane& a, const Lane& b) {
+  LaneOfWidth<S, W> result;
+  [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
+    shuffle<Pick{}(static_cast<int>(I))...>(a, b, result);
   }(std::make_index_sequence<W>{});
+  return result;
 }
 
 /// Numbers First, First + 1, ...
@@ -109,8 +112,8 @@ template <class S, int W, int R>
   } else if constexpr (W == 2) {
     return Lane{from[0], S(0)};
   } else {
-    return shuffled<W, PickFrom<0>>(load_lanes<S, half, R>(from),
-                                    load_lanes<S, half, R - half>(from + (R > half ? half : 0)));
+    return shuffled<S, W, PickFrom<0>>(load_lanes<S, half, R>(from),
+                                       load_lanes<S, half, R - half>(from + (R > half ? half : 0)));
   }
 }
 
@@ -123,9 +126,9 @@ template <class S, int W, int R, class Lane>
   } else if constexpr (W == 2) {
     if constexpr (R == 1) to[0] = lane[0];
   } else if constexpr (R > 0) {
-    store_lanes<S, half, R>(to, shuffled<half, PickFrom<0>>(lane, lane));
+    store_lanes<S, half, R>(to, shuffled<S, half, PickFrom<0>>(lane, lane));
     if constexpr (R > half)
-      store_lanes<S, half, R - half>(to + half, shuffled<half, PickFrom<half>>(lane, lane));
+      store_lanes<S, half, R - half>(to + half, shuffled<S, half, PickFrom<half>>(lane, lane));
   }
 }
 

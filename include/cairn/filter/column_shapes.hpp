@@ -83,7 +83,7 @@ template <int Col, bool WithoutDiagonal, class A>
 }
 
 /// Transposes the W x W matrix whose rows are given: log2(W) rounds of exchanges.
-template <int W, class Lane>
+template <class S, int W, class Lane>
 [[gnu::always_inline]] inline void transpose_lanes(Lane (&rows)[W]) {
   unrolled<4>([&](auto round) __attribute__((always_inline)) {
     constexpr int s = 1 << static_cast<int>(round);
@@ -92,8 +92,8 @@ template <int W, class Lane>
         constexpr int i = static_cast<int>(row);
         if constexpr ((i & s) == 0) {
           const Lane a = rows[i], b = rows[i + s];
-          rows[i] = shuffled<W, PickExchanged<W, s, false>>(a, b);
-          rows[i + s] = shuffled<W, PickExchanged<W, s, true>>(a, b);
+          rows[i] = shuffled<S, W, PickExchanged<W, s, false>>(a, b);
+          rows[i + s] = shuffled<S, W, PickExchanged<W, s, true>>(a, b);
         }
       });
     }
@@ -120,7 +120,7 @@ template <int N, class S>
         else
           block[lane] = typename Column<N, S>::Lane{};
       });
-      transpose_lanes<w>(block);
+      transpose_lanes<S, w>(block);
       unrolled<static_cast<std::size_t>(w)>([&](auto lane) __attribute__((always_inline)) {
         constexpr int i = rows * w + static_cast<int>(lane);
         if constexpr (i < N) to[i].lanes[columns] = block[lane];
@@ -147,13 +147,13 @@ template <int N, class S>
       if constexpr (to >= from) {
         Lane block[w];
         for (int l = 0; l < w; ++l) block[l] = from * w + l < N ? columns[from * w + l].lanes[to] : Lane{};
-        transpose_lanes<w>(block);
+        transpose_lanes<S, w>(block);
         unrolled<static_cast<std::size_t>(N - to * w < w ? N - to * w : w)>(
             [&](auto lane) __attribute__((always_inline)) {
               constexpr int l = static_cast<int>(lane);
               Lane& target = columns[to * w + l].lanes[from];
               if constexpr (from == to)  // above the diagonal is what stands before lane l
-                target = shuffled<w, PickHead<w, l>>(target, block[l]);
+                target = shuffled<S, w, PickHead<w, l>>(target, block[l]);
               else
                 target = block[l];
             });

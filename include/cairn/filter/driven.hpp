@@ -4,16 +4,18 @@
 /// @file
 /// Models whose noise is not simply added: they say themselves how it enters.
 ///
-///   struct Driven {                          // noise w enters through the motion
-///     using State = SE2;  using Control = Vector<2>;  using Noise = Vector<2>;
-///     State propagate(const State& x, const Control& u, const Noise& w, double dt) const;
-///     Matrix<2> noise(const State& x, const Control& u, double dt) const;      // covariance of w
-///   };
-///   struct Echo {                            // noise v enters through the sensor
-///     using State = SE2;  using Measurement = Vector<1>;  using Noise = Vector<1>;
-///     Measurement predict(const State& x, const Noise& v) const;
-///     Matrix<1> noise(const State& x) const;                                   // covariance of v
-///   };
+/// ```cpp
+/// struct Driven {  // noise w enters through the motion
+///   using State = cairn::SE2;  using Control = cairn::Vector<2>;  using Noise = cairn::Vector<2>;
+///   State propagate(const State& x, const Control& u, const Noise& w, double dt) const;
+///   cairn::Matrix<2> noise(const State& x, const Control& u, double dt) const;  // covariance of w
+/// };
+/// struct Echo {  // noise v enters through the sensor
+///   using State = cairn::SE2;  using Measurement = cairn::Vector<1>;  using Noise = cairn::Vector<1>;
+///   Measurement predict(const State& x, const Noise& v) const;
+///   cairn::Matrix<1> noise(const State& x) const;  // covariance of v
+/// };
+/// ```
 ///
 /// For the filters that follow the noise through the model: augmented.hpp, ensemble.hpp. Models of model.hpp,
 /// whose noise is added at the end, are taken there as well.

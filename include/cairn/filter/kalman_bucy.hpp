@@ -12,12 +12,14 @@
 /// the classical Runge-Kutta rule in `steps` equal parts. Measurements at instants go through Kalman,
 /// Extended or InformationFilter: together that is the continuous-discrete filter.
 ///
-///   struct Drifting {
-///     using State = Vector<2>;  using Control = NoControl;
-///     Tangent<State> rate(const State& x, const Control& u) const;        // per second
-///     Matrix<2> rate_jacobian(const State& x, const Control& u) const;    // A
-///     Matrix<2> spectral_density(const State& x, const Control& u) const; // Q, per second
-///   };
+/// ```cpp
+/// struct Drifting {
+///   using State = cairn::Vector<2>;  using Control = cairn::NoControl;
+///   cairn::Tangent<State> rate(const State& x, const Control& u) const;         // per second
+///   cairn::Matrix<2> rate_jacobian(const State& x, const Control& u) const;     // A
+///   cairn::Matrix<2> spectral_density(const State& x, const Control& u) const;  // Q, per second
+/// };
+/// ```
 #pragma once
 
 #include <concepts>

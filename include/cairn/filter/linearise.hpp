@@ -4,12 +4,21 @@
 /// @file
 /// Jacobians for models that do not give them, chosen by word: numeric(model), automatic(model).
 ///
-///   extended.update(belief, automatic(camera), z);
+/// ```cpp
+/// const auto innovation = extended.update(belief, cairn::automatic(radar), z);
+/// ```
 ///
 /// numeric() differentiates propagate and predict by central differences: 2 dof + 1 calls a Jacobian.
 /// automatic() sends dual numbers through them: one call, exact, for models whose propagate and predict are
-/// templates over the scalar,
-///   template <class T> Vector<2, T> propagate(const Vector<2, T>& x, const Control& u, double dt) const;
+/// templates over the scalar:
+/// ```cpp
+/// struct Pendulum {
+///   using State = cairn::Vector<2>;  using Control = cairn::NoControl;
+///   template <class T>
+///   cairn::Vector<2, T> propagate(const cairn::Vector<2, T>& x, const Control& u, double dt) const;
+///   cairn::Matrix<2> noise(const State& x, const Control& u, double dt) const;
+/// };
+/// ```
 /// check_jacobian() holds a model's own Jacobian against central differences, check_jacobians() all three
 /// against one another.
 #pragma once

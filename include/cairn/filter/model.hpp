@@ -4,18 +4,20 @@
 /// @file
 /// What a filter asks of a model: plain structs with a few member functions.
 ///
-///   struct Unicycle {
-///     using State = SE2;  using Control = Vector<2>;
-///     State propagate(const State& x, const Control& u, double dt) const;    // x at the next step, no noise
-///     Matrix<3> noise(const State& x, const Control& u, double dt) const;    // added per step, at the new x
-///     Matrix<3> jacobian(const State& x, const Control& u, double dt) const; // optional: d new / d old step
-///   };
-///   struct Compass {
-///     using State = SE2;  using Measurement = SO2;
-///     Measurement predict(const State& x) const;   // without noise
-///     Matrix<1> noise(const State& x) const;       // covariance of local(predict(x), z)
-///     Matrix<1, 3> jacobian(const State& x) const; // optional
-///   };
+/// ```cpp
+/// struct Unicycle {
+///   using State = cairn::SE2;  using Control = cairn::Vector<2>;
+///   State propagate(const State& x, const Control& u, double dt) const;  // x at the next step, no noise
+///   cairn::Matrix<3> noise(const State& x, const Control& u, double dt) const;  // per step, at the new x
+///   cairn::Matrix<3> jacobian(const State& x, const Control& u, double dt) const;  // optional
+/// };
+/// struct Compass {
+///   using State = cairn::SE2;  using Measurement = cairn::SO2;
+///   Measurement predict(const State& x) const;           // without noise
+///   cairn::Matrix<1> noise(const State& x) const;        // covariance of local(predict(x), z)
+///   cairn::Matrix<1, 3> jacobian(const State& x) const;  // optional
+/// };
+/// ```
 ///
 /// Laws, which tests check and types cannot: noise is symmetric and at least zero (a sensor's above zero),
 /// propagate(x, u, 0) = x, jacobians agree with numeric differentiation in the tangent spaces. A model whose

@@ -6,12 +6,15 @@
 /// over the parts that are easy once the hard part is known. With a pose as the hard part and landmarks as
 /// the easy parts this is FastSLAM (M. Montemerlo et al., AAAI 2002).
 ///
-///   struct Sighting {
-///     using State = SE2;  using Part = Vector<2>;  using Measurement = Product<Vector<1>, SO2>;
-///     Measurement predict(const State& x, const Part& part) const;
-///     Matrix<2> part_jacobian(const State& x, const Part& part) const;     // by the part
-///     Matrix<2> noise(const State& x, const Part& part) const;
-///   };
+/// ```cpp
+/// struct Sighting {
+///   using State = cairn::SE2;  using Part = cairn::Vector<2>;
+///   using Measurement = cairn::Product<cairn::Vector<1>, cairn::SO2>;  // range, bearing
+///   Measurement predict(const State& x, const Part& part) const;
+///   cairn::Matrix<2> part_jacobian(const State& x, const Part& part) const;  // by the part
+///   cairn::Matrix<2> noise(const State& x, const Part& part) const;
+/// };
+/// ```
 #pragma once
 
 #include <concepts>

@@ -9,9 +9,14 @@
 /// (H. Rauch, F. Tung, C. Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA Journal 3,
 /// 1965; S. Sarkka, "Unscented Rauch-Tung-Striebel smoother", IEEE Trans. Automatic Control 53, 2008.)
 ///
-///   Recorder recorder(Kalman{}, prior);
-///   status = recorder.predict(process, dt);   innovation = recorder.update(sensor, z);   ...
-///   std::vector<Gaussian<State>> path = recorder.smoothed();
+/// ```cpp
+/// cairn::Recorder recorder(cairn::Kalman{}, prior);
+/// for (const auto& z : measurements) {
+///   status = recorder.predict(process, dt);
+///   innovation = recorder.update(sensor, z);
+/// }
+/// const std::vector<cairn::Gaussian<State>> path = recorder.smoothed();
+/// ```
 #pragma once
 
 #include <concepts>

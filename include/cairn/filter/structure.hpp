@@ -6,9 +6,11 @@
 ///
 /// A model that returns one of these as its Jacobian lets every filter skip the zeros:
 ///
-///   Structured<"1.* .1. ..1"> F{dt};         1 where '1', 0 where '.', the next given number where '*'
-///   Identity<3> H;                           a landmark seen directly
-///   Selection<6, 0, 2> H;                    rows of the identity: two positions out of six states
+/// ```cpp
+/// const cairn::Structured<"1.* .1. ..1"> F{dt};  // 1 and 0 where '1' and '.', the next number where '*'
+/// const cairn::Identity<3> H_landmark;           // a landmark seen directly
+/// const cairn::Selection<6, 0, 2> H_position;    // rows of the identity: two positions out of six states
+/// ```
 ///
 /// Each converts to the plain Matrix it stands for, so nothing else needs to know.
 #pragma once

@@ -4,11 +4,14 @@
 /// @file
 /// Measurements that come late, out of order, or not at all: a filter over moments instead of over calls.
 ///
-///   Timeline<Extended, Unicycle, RangeBearing, Compass> timeline(Extended{}, Unicycle{}, prior, 0.0,
-///   u, 2.0); timeline.steer(u, 1.0);                       // the control from 1.0 s on
-///   timeline.measure(compass, heading, 1.4);
-///   timeline.measure(beacon, z, 1.1);             // late: 1.4 s is taken back and done again
-///   timeline.at(1.5);
+/// ```cpp
+/// using Track = cairn::Timeline<cairn::Extended, cairn::Unicycle, cairn::RangeBearing, cairn::Compass>;
+/// Track timeline(cairn::Extended{}, cairn::Unicycle{}, prior, 0.0, u, /*horizon*/ 2.0);
+/// status = timeline.steer(turning, 1.0);                          // the control from 1.0 s on
+/// const auto newest = timeline.measure(compass, heading, 1.4);
+/// const auto late = timeline.measure(beacon, z, 1.1);             // 1.4 s is taken back and done again
+/// const std::optional<cairn::Gaussian<cairn::SE2>> later = timeline.at(1.5);
+/// ```
 ///
 /// The beliefs after the events of the last `horizon` seconds are kept; what comes late is put in its place
 /// and the events after it are repeated, so the belief is exactly that of the filter that got everything in

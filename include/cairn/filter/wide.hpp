@@ -5,7 +5,9 @@
 /// Sigma points side by side: wide(model) lets the unscented filter send them through the model in SIMD
 /// lanes.
 ///
-///   unscented.predict(belief, wide(vehicle), u, dt);
+/// ```cpp
+/// const cairn::Status status = unscented.predict(belief, cairn::wide(vehicle), u, dt);
+/// ```
 ///
 /// For models whose propagate or predict is a template over the scalar, as automatic() needs it, and neither
 /// branches on a number (say select(), pack.hpp) nor uses functions that packs do not have. Results differ

@@ -4,10 +4,13 @@
 /// @file
 /// Metrics whose axes differ: weights, and circles such as angles that wrap (SO(2)).
 ///
-///   // planar poses x, y [m], heading [rad]; half a radian counts like a metre
-///   using Pose = cairn::Circular<cairn::WeightedL2<3>, 3>;
-///   Pose metric{.period = {cairn::straight, cairn::straight, 2 * pi}, .base = {{1, 1, 2}}};
-///   cairn::KdTree<float, 3, Pose> tree(poses, metric);
+/// ```cpp
+/// // planar poses x, y [m], heading [rad]; half a radian counts like a metre
+/// using PoseDistance = cairn::Circular<cairn::WeightedL2<3>, 3>;
+/// constexpr float turn = 2 * std::numbers::pi_v<float>;
+/// const PoseDistance metric{.periods = {cairn::straight, cairn::straight, turn}, .base = {{1, 1, 2}}};
+/// const cairn::KdTree<float, 3, PoseDistance> tree(poses, metric);
+/// ```
 ///
 /// Weights stand inside, circles outside. A tree refuses weights, periods and dimensions that cannot be.
 #pragma once

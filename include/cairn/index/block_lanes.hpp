@@ -24,6 +24,7 @@
 #include <emmintrin.h>
 #endif
 
+#include <cairn/core/shuffle.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn::inline CAIRN_ABI::detail {
@@ -93,9 +94,11 @@ template <class Int>
   Four fours[2];
   std::memcpy(fours, &eight, sizeof(eight));
   Four four = fours[0] < fours[1] ? fours[0] : fours[1];
-  const Four swapped = __builtin_shufflevector(four, four, 2, 3, 0, 1);
+  Four swapped;
+  shuffle<2, 3, 0, 1>(four, four, swapped);
   four = four < swapped ? four : swapped;
-  const Four crossed = __builtin_shufflevector(four, four, 1, 0, 3, 2);
+  Four crossed;
+  shuffle<1, 0, 3, 2>(four, four, crossed);
   four = four < crossed ? four : crossed;
   return four[0];
 }

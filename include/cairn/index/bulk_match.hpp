@@ -5,9 +5,12 @@
 /// The exact two nearest of a whole set of queries, without a tree: what matching one picture against another
 /// or against a small map needs.
 ///
-///   const cairn::PackedPoints map(descriptors);                      // any PointSet
-///   for (const auto& two : cairn::nearest_two(map, queries)) ...     // two.id, two.first, two.second
-///   for (const auto& match : cairn::match(map, queries, {.ratio = 1.25F})) ...
+/// ```cpp
+/// const cairn::PackedPoints map(descriptors);  // any PointSet
+/// for (const auto& two : cairn::nearest_two(map, queries)) look_at(two);
+/// for (const auto& match : cairn::match(map, queries, {.ratio = 1.25F}))  // those that pass the ratio test
+///   look_at(match);
+/// ```
 ///
 /// |q - p|^2 = |q|^2 + |p|^2 - 2 q.p is computed for tiles of queries and sixteen points at a time, from
 /// points that stay in the cache; that takes half the operations of differences, but cancels. So it only

@@ -5,10 +5,12 @@
 /// An index of descriptors (tens to hundreds of numbers) for a search under a budget: one byte a coordinate,
 /// in cells around means, and the caller's points for the last word.
 ///
-///   const cairn::DescriptorIndex index(descriptors);        // refers to them; a quarter of their memory
-///   cairn::DescriptorIndex<...>::Search search;             // one a thread
-///   cairn::NearestTwo<float> two;
-///   search.search(index, query, two, {.leaves = 64});
+/// ```cpp
+/// const cairn::DescriptorIndex index(descriptors);           // refers to them; a quarter of their memory
+/// decltype(index)::Search search;                            // one a thread
+/// cairn::NearestTwo<float> two;
+/// search.search(index, query, two, {.leaves = 64});
+/// ```
 ///
 /// The cells begin as those of a kd-tree and are moved to their means (mean_cells.hpp). A query asks for its
 /// distance from all means and scans the nearest cells first (an inverted file: Jegou, Douze, Schmid,

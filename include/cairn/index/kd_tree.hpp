@@ -4,11 +4,13 @@
 /// @file
 /// A static balanced kd-tree, built once, that owns its points in leaf order.
 ///
-///   KdTree<float, 3> tree(points);                     // any PointSet
-///   if (auto hit = tree.nearest(query)) use(hit->id, hit->distance);
-///   for (auto [id, distance] : tree.nearest(query, 10)) ...
-///   for (auto [id, distance] : tree.within(query, 0.5f)) ...
-///   tree.search(query, my_collector);
+/// ```cpp
+/// const cairn::KdTree<float, 3> tree(points);  // any PointSet
+/// if (const auto hit = tree.nearest(query)) use(hit->id, hit->distance);
+/// for (const auto& [id, distance] : tree.nearest(query, 10)) use(id, distance);
+/// for (const auto& [id, distance] : tree.within(query, 0.5F)) use(id, distance);
+/// tree.search(query, my_collector);
+/// ```
 ///
 /// Up to eight dimensions exact search runs over nodes of sixteen boxes (box_tree.hpp); above, over single
 /// splits with the distance to the cell kept up to date (Arya and Mount, "Algorithms for fast vector

@@ -4,12 +4,19 @@
 /// @file
 /// The landmark store: descriptors that are matched, earn trust, and are kept in one tree or in several.
 ///
-///   MultiTreeStore<64> store({.classes = 2});
-///   for each step:
-///     store.match_all(descriptors, labels, test, budget, threads)   // against all steps before
-///     store.sighted(match.id) ... store.add(descriptor, label) ...
-///     StepReport report = store.advance();                          // promoted, expired; new ones
-///     searchable
+/// ```cpp
+/// cairn::MultiTreeStore<64> store({.classes = 2});
+/// for (const Frame& frame : frames) {
+///   // against all that was added in the steps before
+///   const auto matches = store.match_all(frame.descriptors, frame.labels, test, budget);
+///   for (std::size_t i = 0; i < matches.size(); ++i)
+///     if (matches[i])
+///       store.sighted(matches[i]->id);
+///     else
+///       store.add(frame.descriptor(i), frame.labels[i]);
+///   const cairn::StepReport report = store.advance();  // promoted, expired; the new ones can be found now
+/// }
+/// ```
 ///
 /// SingleTreeStore rebuilds one tree of everything at each step: O(n log n). MultiTreeStore rebuilds a tree
 /// of the landmarks on probation and keeps the base ones in a multi-kd-tree: polylogarithmic, amortised. With

@@ -5,8 +5,11 @@
 /// The points of a kd-tree one after the other, nearest first, for callers who do not know beforehand how
 /// many they need (Hjaltason and Samet, "Distance browsing in spatial databases", ACM TODS 24, 1999).
 ///
-///   NearestFirst order(tree, query);
-///   while (auto hit = order.next()) if (suits(hit->id)) break;
+/// ```cpp
+/// cairn::NearestFirst order(tree, query);
+/// while (const auto hit = order.next())
+///   if (suits(hit->id)) break;
+/// ```
 #pragma once
 
 #include <algorithm>

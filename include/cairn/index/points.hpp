@@ -65,7 +65,12 @@ private:
 
 /// A set of points seen through a function that gives their coordinates:
 ///
-///   cairn::Through points(cloud, 3, [](const Foreign& p, std::size_t axis) { return (&p.x)[axis]; });
+/// ```cpp
+/// const auto coordinate = [](const Foreign& p, std::size_t axis) {
+///   return axis == 0 ? p.x : axis == 1 ? p.y : p.z;
+/// };
+/// const cairn::Through points(cloud, 3, coordinate);
+/// ```
 ///
 /// Refers to the set, which must live as long.
 template <class Set, class Coordinate>

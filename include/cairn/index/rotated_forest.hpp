@@ -5,10 +5,12 @@
 /// Several kd-trees of the same descriptors, each along axes of its own, searched with one queue and one
 /// budget (Silpa-Anan and Hartley, "Optimised KD-trees for fast image descriptor matching", CVPR 2008).
 ///
-///   const cairn::RotatedForest<64> forest(descriptors, {.trees = 2});
-///   cairn::BestBinFirst<cairn::RotatedForest<64>> search;          // one a thread
-///   cairn::NearestTwo<float> two;
-///   search.search(forest, query, two, {.leaves = 64});
+/// ```cpp
+/// const cairn::RotatedForest<64> forest(descriptors, {.trees = 2});
+/// cairn::BestBinFirst<cairn::RotatedForest<64>> search;  // one a thread
+/// cairn::NearestTwo<float> two;
+/// search.search(forest, query, two, {.leaves = 64});
+/// ```
 ///
 /// The first tree splits along the principal axes; the others turn the foremost of them by random rotations,
 /// so that a point that one tree hides behind a split is in front in another. Each tree holds all points:

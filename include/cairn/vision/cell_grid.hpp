@@ -107,9 +107,7 @@ void sample_cells(const IntegralImage& sums, double x, double y, double size, Ce
     };
     for (std::size_t k = 0; k < count; k += 4) {
       const Float4 two = strip(k / 2), two_more = strip(k / 2 + 1);
-      store4(__builtin_shufflevector(two, two_more, 0, 2, 4, 6) +
-                 __builtin_shufflevector(two, two_more, 1, 3, 5, 7),
-             &line[k]);
+      store4(lanes_of<0, 2, 4, 6>(two, two_more) + lanes_of<1, 3, 5, 7>(two, two_more), &line[k]);
     }
     if (j == 0) continue;
     float* const cells = grid.row(static_cast<int>(j) - 1);
@@ -148,10 +146,10 @@ void turn_cells(const CellGrid<M>& upright, float cosine, float sine, CellGrid<N
       const Float4 above_more = load_pairs(cells + at[2], cells + at[3]);
       const Float4 below = load_pairs(cells + stride + at[0], cells + stride + at[1]);
       const Float4 below_more = load_pairs(cells + stride + at[2], cells + stride + at[3]);
-      const Float4 mixed = above + (below - above) * __builtin_shufflevector(y, y, 0, 0, 1, 1);
-      const Float4 more = above_more + (below_more - above_more) * __builtin_shufflevector(y, y, 2, 2, 3, 3);
-      const Float4 left = __builtin_shufflevector(mixed, more, 0, 2, 4, 6);
-      const Float4 right = __builtin_shufflevector(mixed, more, 1, 3, 5, 7);
+      const Float4 mixed = above + (below - above) * lanes_of<0, 0, 1, 1>(y, y);
+      const Float4 more = above_more + (below_more - above_more) * lanes_of<2, 2, 3, 3>(y, y);
+      const Float4 left = lanes_of<0, 2, 4, 6>(mixed, more);
+      const Float4 right = lanes_of<1, 3, 5, 7>(mixed, more);
       store4(left + (right - left) * x, row + i);
     }
   }

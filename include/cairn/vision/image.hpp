@@ -7,7 +7,9 @@
 /// Pixels lie row by row from the top; (x, y) is column and row, and the centre of a pixel has integer
 /// coordinates. Functions that only read take an ImageView by value; an Image converts to one by itself, and
 /// so does the buffer of any other library:
-///   cairn::ImageView view(mat.data, mat.cols, mat.rows, mat.step);
+/// ```cpp
+/// const cairn::ImageView view(mat.data, mat.cols, mat.rows, mat.step);
+/// ```
 #pragma once
 
 #include <algorithm>

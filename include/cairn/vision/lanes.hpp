@@ -13,6 +13,7 @@
 #include <cstdint>
 #include <cstring>
 
+#include <cairn/core/shuffle.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn::inline CAIRN_ABI::detail {
@@ -47,6 +48,14 @@ template <class Number>
   std::memcpy(&first, from, sizeof first);
   std::memcpy(&second, also_from, sizeof second);
   return reinterpret_cast<Vector>(Long2{first, second});
+}
+
+/// Lanes of a and b written one after the other, by their numbers.
+template <int First, int Second, int Third, int Fourth>
+[[nodiscard, gnu::always_inline]] inline Float4 lanes_of(const Float4& a, const Float4& b) noexcept {
+  Float4 lanes;
+  shuffle<First, Second, Third, Fourth>(a, b, lanes);
+  return lanes;
 }
 
 [[nodiscard, gnu::always_inline]] inline Float4 to_float(Unsigned4 two_complement) noexcept {

@@ -4,7 +4,9 @@
 /// @file
 /// SURF: finds blobs in an image and describes each by 64 or 128 numbers.
 ///
-///   const cairn::Features features = cairn::surf(image, {.upright = true, .target_count = 2000});
+/// ```cpp
+/// const cairn::Features features = cairn::surf(image, {.upright = true, .target_count = 2000});
+/// ```
 ///
 /// The detector is in fast_hessian.hpp, the direction in surf_orientation.hpp, the numbers in
 /// surf_descriptor.hpp. H. Bay, A. Ess, T. Tuytelaars and L. Van Gool, "Speeded-up robust features (SURF)",

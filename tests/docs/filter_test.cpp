@@ -1,0 +1,166 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+// The examples in the headers of cairn/filter and in docs/filters.md, compiled and, but for the models that
+// say what a filter asks for, run: see CMakeLists.txt.
+#include <iostream>
+#include <optional>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include <cairn/core/statistics.hpp>
+#include <cairn/filter/driven.hpp>
+#include <cairn/filter/extended.hpp>
+#include <cairn/filter/kalman.hpp>
+#include <cairn/filter/kalman_bucy.hpp>
+#include <cairn/filter/linearise.hpp>
+#include <cairn/filter/model.hpp>
+#include <cairn/filter/rao_blackwell.hpp>
+#include <cairn/filter/smoother.hpp>
+#include <cairn/filter/structure.hpp>
+#include <cairn/filter/timeline.hpp>
+#include <cairn/filter/unscented.hpp>
+#include <cairn/filter/wide.hpp>
+#include <cairn/manifold/product.hpp>
+#include <cairn/manifold/se2.hpp>
+#include <cairn/models/motion.hpp>
+#include <cairn/models/sensor.hpp>
+
+namespace docs_filter_test {
+
+namespace model {
+#include "snippets/filter/model_1.inc"
+static_assert(cairn::LinearisedProcess<Unicycle> && cairn::LinearisedMeasurement<Compass>);
+}  // namespace model
+
+namespace driven {
+#include "snippets/filter/driven_1.inc"
+static_assert(cairn::DrivenProcess<Driven> && cairn::DrivenMeasurement<Echo>);
+}  // namespace driven
+
+namespace rao_blackwell {
+#include "snippets/filter/rao_blackwell_1.inc"
+static_assert(cairn::ConditionalMeasurement<Sighting>);
+}  // namespace rao_blackwell
+
+namespace kalman_bucy {
+#include "snippets/filter/kalman_bucy_1.inc"
+static_assert(cairn::ContinuousProcess<Drifting>);
+}  // namespace kalman_bucy
+
+namespace linearise {
+#include "snippets/filter/linearise_2.inc"
+using Differentiated = decltype(cairn::automatic(Pendulum{}));
+static_assert(cairn::LinearisedProcess<Differentiated>);
+}  // namespace linearise
+
+const cairn::Gaussian<cairn::SE2> planar_prior{cairn::SE2(), 0.01 * cairn::Matrix<3>::Identity()};
+const cairn::RangeBearing beacon{.beacon = {5, 1}};
+const cairn::Compass compass;
+
+TEST_CASE("docs: the example of smoother.hpp smooths a record") {
+  using State = cairn::Vector<2>;
+  const cairn::ConstantVelocity<1> process;
+  const cairn::PositionSensor<1, 2> sensor{.covariance = cairn::Matrix<1>(0.25)};
+  const cairn::Gaussian<State> prior{State::Zero(), cairn::Matrix<2>::Identity()};
+  const std::vector<cairn::Vector<1>> measurements(3, cairn::Vector<1>(1.0));
+  const double dt = 0.1;
+  cairn::Status status{};
+  cairn::Innovation<1> innovation;
+#include "snippets/filter/smoother_1.inc"
+  CHECK(status == cairn::Status::accepted);
+  CHECK(innovation.accepted());
+  REQUIRE(path.size() == 4);
+  CHECK(path[0].covariance(0, 0) < 1);
+  CHECK(path[3].mean == recorder.belief().mean);
+}
+
+/// x' = x + u dt, and its square is measured.
+struct Walker {
+  using State = cairn::Vector<1>;
+  using Control = cairn::Vector<1>;
+  using Measurement = cairn::Vector<1>;
+  template <class T>
+  cairn::Vector<1, T> propagate(const cairn::Vector<1, T>& x, const Control& u, double dt) const {
+    return cairn::Vector<1, T>(x[0] + u[0] * dt);
+  }
+  [[nodiscard]] cairn::Matrix<1> noise(const State&, const Control&, double) const {
+    return cairn::Matrix<1>(1.0);
+  }
+  template <class T>
+  cairn::Vector<1, T> predict(const cairn::Vector<1, T>& x) const {
+    return cairn::Vector<1, T>(x[0] * x[0]);
+  }
+  [[nodiscard]] cairn::Matrix<1> noise(const State&) const { return cairn::Matrix<1>(1.0); }
+};
+
+TEST_CASE("docs: the example of wide.hpp predicts") {
+  const Walker vehicle;
+  const cairn::Unscented unscented;
+  const Walker::Control u(3.0);
+  const double dt = 0.5;
+  cairn::Gaussian<cairn::Vector<1>> belief{cairn::Vector<1>(2.0), cairn::Matrix<1>(1.0)};
+#include "snippets/filter/wide_1.inc"
+  CHECK(status == cairn::Status::accepted);
+  CHECK(belief.mean[0] == doctest::Approx(3.5));
+  CHECK(belief.covariance(0, 0) == doctest::Approx(2.0));
+}
+
+TEST_CASE("docs: the first example of linearise.hpp differentiates") {
+  const Walker radar;
+  const cairn::Extended extended;
+  const cairn::Vector<1> z(5.0);
+  cairn::Gaussian<cairn::Vector<1>> belief{cairn::Vector<1>(2.0), cairn::Matrix<1>(1.0)};
+#include "snippets/filter/linearise_1.inc"
+  CHECK(innovation.accepted());
+  CHECK(innovation.covariance(0, 0) == doctest::Approx(17.0));
+}
+
+TEST_CASE("docs: the examples of structure.hpp are the matrices they look like") {
+  const double dt = 0.5;
+#include "snippets/filter/structure_1.inc"
+  CHECK(cairn::Matrix<3>(F) == (cairn::Matrix<3>() << 1, 0, dt, 0, 1, 0, 0, 0, 1).finished());
+  CHECK(cairn::Matrix<3>(H_landmark) == cairn::Matrix<3>::Identity());
+  const cairn::Matrix<2, 6> position = H_position;
+  CHECK(position.sum() == 2);
+  CHECK(position(0, 0) == 1);
+  CHECK(position(1, 2) == 1);
+}
+
+TEST_CASE("docs: the example of timeline.hpp takes a late measurement in") {
+  const auto& prior = planar_prior;
+  const cairn::Vector<2> u(1.0, 0.0), turning(1.0, 0.1);
+  const cairn::SO2 heading;
+  const auto z = cairn::RangeBearing::measurement(4.0, 0.2);
+  cairn::Status status{};
+#include "snippets/filter/timeline_1.inc"
+  CHECK(status == cairn::Status::accepted);
+  CHECK(newest.accepted());
+  CHECK(late.accepted());
+  REQUIRE(later);
+  CHECK(timeline.size() == 3);
+}
+
+TEST_CASE("docs: the first example of docs/filters.md predicts and updates") {
+  const cairn::SE2 start;
+  const cairn::Matrix<3> covariance = 0.01 * cairn::Matrix<3>::Identity();
+  const cairn::Vector<2> control(1.0, 0.0), b(5.0, 1.0);
+  const double dt = 0.1;
+  const auto z = cairn::RangeBearing::measurement(5.0, 0.2);
+#include "snippets/docs/filters_1.inc"
+  CHECK(innovation.accepted());
+}
+
+TEST_CASE("docs: the second example of docs/filters.md takes a late measurement in") {
+  const auto& belief = planar_prior;
+  const cairn::Vector<2> control(1.0, 0.0);
+  const cairn::SO2 heading;
+  const auto z = cairn::RangeBearing::measurement(4.0, 0.2);
+#include "snippets/docs/filters_2.inc"
+  CHECK(newest.accepted());
+  CHECK(late.accepted());
+  CHECK(timeline.time() == 1.4);
+}
+
+}  // namespace docs_filter_test

@@ -1,0 +1,141 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+// The examples in the headers of cairn/index, compiled and run: each is cut out of its header by
+// CMakeLists.txt.
+#include <array>
+#include <cstddef>
+#include <limits>
+#include <numbers>
+#include <span>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include <cairn/core/random.hpp>
+#include <cairn/index/axis_metrics.hpp>
+#include <cairn/index/best_bin_first.hpp>
+#include <cairn/index/bulk_match.hpp>
+#include <cairn/index/descriptor_index.hpp>
+#include <cairn/index/kd_tree.hpp>
+#include <cairn/index/landmark_map.hpp>
+#include <cairn/index/nearest_first.hpp>
+#include <cairn/index/neighbors.hpp>
+#include <cairn/index/points.hpp>
+#include <cairn/index/rotated_forest.hpp>
+
+namespace docs_index_test {
+
+using Descriptors = std::vector<std::array<float, 64>>;
+
+Descriptors some_descriptors() {
+  cairn::Random random(14);
+  Descriptors descriptors(100);
+  for (auto& descriptor : descriptors)
+    for (float& number : descriptor) number = static_cast<float>(random.uniform());
+  return descriptors;
+}
+
+const std::vector<std::array<float, 3>> three_points{{0, 0, 0}, {1, 0, 0}, {0, 2, 0}};
+
+/// The nearest point of a collector's own making.
+struct Closest {
+  float best = std::numeric_limits<float>::infinity();
+  cairn::PointId id = cairn::no_point;
+  [[nodiscard]] float limit() const noexcept { return best; }
+  void offer(cairn::PointId point, float reduced) noexcept {
+    if (reduced < best) best = reduced, id = point;
+  }
+};
+
+TEST_CASE("docs: the example of kd_tree.hpp finds the nearest point and all within a radius") {
+  const auto& points = three_points;
+  const std::array query{0.9F, 0.1F, 0.0F};
+  std::vector<cairn::PointId> used;
+  const auto use = [&](cairn::PointId id, float distance) {
+    CHECK(distance >= 0);
+    used.push_back(id);
+  };
+  Closest my_collector;
+#include "snippets/index/kd_tree_1.inc"
+  CHECK(used == std::vector<cairn::PointId>{1, 1, 0, 2, 1});
+  CHECK(my_collector.id == 1);
+}
+
+TEST_CASE("docs: the example of axis_metrics.hpp takes the shorter way round") {
+  const std::vector<std::array<float, 3>> poses{{0, 0, 3}, {0, 0, 1}};
+#include "snippets/index/axis_metrics_1.inc"
+  const auto hit = tree.nearest(std::array{0.0F, 0.0F, -3.0F});
+  REQUIRE(hit);
+  CHECK(hit->id == 0);
+  CHECK(hit->distance == doctest::Approx(2 * (2 * std::numbers::pi - 6)).epsilon(1e-5));
+}
+
+TEST_CASE("docs: the example of points.hpp shows foreign points as points") {
+  struct Foreign {
+    float x, y, z;
+  };
+  const std::vector<Foreign> cloud{{1, 2, 3}};
+#include "snippets/index/points_1.inc"
+  CHECK(points[0][0] == 1);
+  CHECK(points[0][1] == 2);
+  CHECK(points[0][2] == 3);
+}
+
+TEST_CASE("docs: the example of nearest_first.hpp stops at the first point that suits") {
+  const cairn::KdTree<float, 3> tree(three_points);
+  const std::array query{0.9F, 0.1F, 0.0F};
+  std::vector<cairn::PointId> asked;
+  const auto suits = [&](cairn::PointId id) {
+    asked.push_back(id);
+    return id == 0;
+  };
+#include "snippets/index/nearest_first_1.inc"
+  CHECK(asked == std::vector<cairn::PointId>{1, 0});
+}
+
+TEST_CASE("docs: the example of bulk_match.hpp finds each descriptor") {
+  const Descriptors descriptors = some_descriptors();
+  const Descriptors queries(descriptors.begin(), descriptors.begin() + 5);
+  std::size_t looked = 0;
+  const auto look_at = [&](const auto&) { ++looked; };
+#include "snippets/index/bulk_match_1.inc"
+  CHECK(looked == 10);
+}
+
+TEST_CASE("docs: the example of descriptor_index.hpp finds a descriptor") {
+  const Descriptors descriptors = some_descriptors();
+  const auto& query = descriptors[42];
+#include "snippets/index/descriptor_index_1.inc"
+  CHECK(two.id() == 42);
+}
+
+TEST_CASE("docs: the example of rotated_forest.hpp finds a descriptor") {
+  const Descriptors descriptors = some_descriptors();
+  const auto& query = descriptors[42];
+#include "snippets/index/rotated_forest_1.inc"
+  CHECK(two.id() == 42);
+}
+
+TEST_CASE("docs: the example of landmark_map.hpp sees again what it added") {
+  struct Frame {
+    std::vector<float> descriptors;
+    std::vector<unsigned> labels;
+    [[nodiscard]] std::span<const float> descriptor(std::size_t i) const {
+      return std::span(descriptors).subspan(64 * i, 64);
+    }
+  };
+  Frame same;
+  for (const auto& descriptor : some_descriptors()) {
+    same.descriptors.insert(same.descriptors.end(), descriptor.begin(), descriptor.end());
+    same.labels.push_back(static_cast<unsigned>(same.labels.size() % 2));
+  }
+  const std::vector<Frame> frames{same, same, same};
+  const cairn::RatioTest test{.ratio = 1.25F};
+  const cairn::Budget budget;
+#include "snippets/index/landmark_map_1.inc"
+  CHECK(store.size() == 100);
+  CHECK(store.base_size() == 100);
+}
+
+}  // namespace docs_index_test
