@@ -39,9 +39,9 @@ std::vector<Point> random_points(std::size_t count, cairn::Random& random) {
 /// of another level.
 void check_invariant(const Index& index) {
   std::size_t below = 0;
-  for (const Index::Tree* tree : index.trees()) {
-    const std::size_t level = index.shape().level_of(tree->size());
-    REQUIRE(!tree->empty());
+  for (const std::size_t size : index.tree_sizes()) {
+    const std::size_t level = index.shape().level_of(size);
+    REQUIRE(size > 0);
     REQUIRE(level + 1 > below);
     below = level + 1;
   }
@@ -114,8 +114,7 @@ void run_program(const cairn::MultiTreeShape& shape) {
 
 /// Ids of the nearest points and the sizes of all trees: what must not depend on the timing of threads.
 std::vector<std::size_t> portrait(const Index& index, const Point& query) {
-  std::vector<std::size_t> numbers;
-  for (const Index::Tree* tree : index.trees()) numbers.push_back(tree->size());
+  std::vector<std::size_t> numbers = index.tree_sizes();
   for (const auto& hit : index.nearest(query, 20)) numbers.push_back(hit.id);
   return numbers;
 }
@@ -148,7 +147,7 @@ TEST_SUITE("multi_kd_tree") {
     Index index({.first_size = 100, .growth = 4});
     for (int step = 0; step < 600; ++step) index.insert(random_points(10, random));
     const double bound = std::log(6000.0 / 100) / std::log(4.0) + 2;
-    CHECK(static_cast<double>(index.trees().size()) <= bound);
+    CHECK(static_cast<double>(index.tree_count()) <= bound);
   }
 
   TEST_CASE("multi_kd_tree: points moved stay within the amortised bound, far below rebuilding") {
@@ -161,7 +160,7 @@ TEST_SUITE("multi_kd_tree") {
       rebuilt += step * batch;
     }
     // Tree 1 is rebuilt at every step; a point is moved into each further tree at most q times.
-    const auto trees = static_cast<double>(index.trees().size());
+    const auto trees = static_cast<double>(index.tree_count());
     CHECK(static_cast<double>(index.points_moved()) < 2000 * 100 + 2000 * batch * 2 * trees);
     CHECK(index.points_moved() * 30 < rebuilt);
   }
@@ -172,7 +171,7 @@ TEST_SUITE("multi_kd_tree") {
     for (std::size_t count = 1; count <= 700; ++count) {
       index.insert(random_points(1, random));
       const std::size_t buffered = count % 11;  // the eleventh point makes the buffer a tree
-      REQUIRE(index.trees().size() ==
+      REQUIRE(index.tree_count() ==
               static_cast<std::size_t>(std::popcount(count / 11)) + (buffered > 0 ? 1U : 0U));
     }
     CHECK(index.points_moved() < 700 * (11 + 7));  // the buffer anew for every point, and once a digit
@@ -184,7 +183,7 @@ TEST_SUITE("multi_kd_tree") {
     for (int step = 0; step < 800; ++step) {
       index.insert(random_points(1 + random.below(12), random));
       std::map<std::size_t, std::size_t> of_level;
-      for (const Index::Tree* tree : index.trees()) ++of_level[index.shape().level_of(tree->size())];
+      for (const std::size_t size : index.tree_sizes()) ++of_level[index.shape().level_of(size)];
       for (const auto& [level, trees] : of_level) REQUIRE(trees <= (level == 0 ? 1 : 4));
     }
   }
@@ -272,7 +271,7 @@ TEST_SUITE("multi_kd_tree") {
         REQUIRE(copies < 39);  // the last round must be one without a failure
         index.finish_merges();
         std::size_t held = 0;
-        for (const auto* tree : index.trees()) held += tree->size();
+        for (const std::size_t size : index.tree_sizes()) held += size;
         REQUIRE(held == stored.size());
       }
     }
