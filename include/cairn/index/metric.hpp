@@ -209,7 +209,8 @@ template <class M, class Real>
 }
 
 /// Lower bound of the distance to a cell after its nearest side on one axis moved from `old` to `offset`
-/// away from the query (both as differences, |offset| >= |old|).
+/// away from the query (both as differences, |offset| >= |old|). Lowered by more than the sum is rounded: a
+/// point at a corner of its cell may be as near as the cell, and its distance is rounded in another order.
 template <class M, class Real>
 [[nodiscard]] Real moved_bound(const M& metric, Real bound, Real old, Real offset,
                                std::size_t axis) noexcept {
@@ -220,7 +221,7 @@ template <class M, class Real>
   } else {
     Real before = 0;
     metric.accumulate(before, old, axis);
-    return bound + (after - before);
+    return (bound + (after - before)) * (1 - 4 * std::numeric_limits<Real>::epsilon());
   }
 }
 

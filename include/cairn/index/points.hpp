@@ -325,6 +325,14 @@ void copy_point(const P& point, std::size_t dim, Scalar* row, const PointPlace& 
   }
 }
 
+/// Throws Error, naming point and axis, where a number among rows of `dim` is none that a point may have.
+template <class Scalar>
+void check_rows(const std::vector<Scalar>& rows, std::size_t dim, const char* what) {
+  std::vector<Scalar> row(dim);
+  for (std::size_t i = 0; i < rows.size() / dim; ++i)
+    copy_point(std::span<const Scalar>(rows.data() + i * dim, dim), dim, row.data(), PointPlace{what, i});
+}
+
 /// Dimension of a point set: Dim where fixed, otherwise the size of its first point.
 template <std::size_t Dim, PointSet Points>
 [[nodiscard]] std::size_t dimension_of(const Points& points) {

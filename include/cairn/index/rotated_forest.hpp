@@ -119,12 +119,9 @@ public:
 private:
   [[nodiscard]] float distance_from_mean(const float* point) const noexcept {
     const std::span<const float> mean = axes_.front().mean();
-    double sum = 0;
-    for (std::size_t a = 0; a < mean.size(); ++a) {
-      const double difference = double{point[a]} - double{mean[a]};
-      sum += difference * difference;
-    }
-    return static_cast<float>(std::sqrt(sum));
+    float sum = 0;
+    for (std::size_t a = 0; a < mean.size(); ++a) L2::accumulate(sum, point[a] - mean[a], a);
+    return std::sqrt(sum);
   }
 
   /// Row by row an orthonormal basis from normal draws (Gram-Schmidt, twice for accuracy).
