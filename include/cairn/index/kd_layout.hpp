@@ -52,7 +52,8 @@ public:
   }
   /// Leaves below slot `slot` of depth `depth`; a slot of the last depth may have none.
   [[nodiscard]] constexpr Range leaves_below(unsigned depth, Size slot) const noexcept {
-    return {first_leaf(depth, slot), first_leaf(depth, slot + 1)};
+    return {static_cast<std::size_t>(first_leaf(depth, slot)),
+            static_cast<std::size_t>(first_leaf(depth, slot + 1))};
   }
   /// Ranks of the first point of leaf `leaf`.
   [[nodiscard]] constexpr Size first_point(Size leaf) const noexcept { return share(points_, leaf, leaves_); }
