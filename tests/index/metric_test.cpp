@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
@@ -10,6 +11,7 @@
 #include <doctest/doctest.h>
 
 #include <cairn/index/axis_metrics.hpp>
+#include <cairn/index/best_bin_first.hpp>
 #include <cairn/index/brute_force.hpp>
 #include <cairn/index/kd_tree.hpp>
 #include <cairn/index/metric.hpp>
@@ -87,6 +89,36 @@ TEST_SUITE("metric") {
       }
     }
     CHECK(missed == 0);
+  }
+
+  TEST_CASE("metric: a bound that was summed split by split does not hide points at a corner of their cell") {
+    const std::uint64_t seed = cairn_test::seed(208);
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    for (const std::size_t dim : {2U, 3U, 9U}) {
+      CAPTURE(dim);
+      std::vector<float> numbers(2000 * dim);
+      for (float& number : numbers) number = 0.1F * static_cast<float>(random.below(9));
+      const cairn::KdTree<float> tree(cairn::Rows<float>(numbers, dim));
+      cairn::BestBinFirst<cairn::KdTree<float>> search;
+      std::size_t missed = 0;
+      for (int round = 0; round < 200; ++round) {
+        std::vector<float> query(dim);
+        for (float& number : query)
+          number = 0.1F * static_cast<float>(random.below(9)) + static_cast<float>(random.uniform(0, 0.1));
+        std::vector<cairn::Neighbor<float>> near(60), within;
+        cairn::KNearest<float> nearest(near.data(), near.size());
+        search.search(tree, query, nearest);
+        const float reduced = near[static_cast<std::size_t>(round) % near.size()].distance;
+        cairn::Within<float> all(within, reduced);
+        search.search(tree, query, all);
+        for (const auto& hit : near)
+          missed +=
+              hit.distance <= reduced && std::none_of(within.begin(), within.end(),
+                                                      [&](const auto& found) { return found.id == hit.id; });
+      }
+      CHECK(missed == 0);
+    }
   }
 
   TEST_CASE("metric: distances keep their digits down to the documented 1e-19, and 1e-154 in double") {
