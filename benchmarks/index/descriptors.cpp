@@ -49,7 +49,7 @@ public:
         axes_.turn(&queries[i * Dim], turned);
         cairn::NearestTwo<float> two;
         search.search(std::span<const Tree* const>(trees), turned, two, {.leaves = leaves});
-        found[i] = {two.id(), std::sqrt(two.first()), std::sqrt(two.second())};
+        found[i] = {two.id(), two.first(), two.second()};
       }
     });
     return found;
@@ -95,7 +95,7 @@ std::unique_ptr<DescriptorRival> make_our_cells(std::size_t dim) {
         for (std::size_t i = 0; i < found.size(); ++i) {
           cairn::NearestTwo<float> two;
           search.search(*held->index, asked[i], two, {.leaves = static_cast<std::size_t>(leaves)});
-          found[i] = {two.id(), std::sqrt(two.first()), std::sqrt(two.second())};
+          found[i] = {two.id(), two.first(), two.second()};
         }
         return found;
       }});
@@ -119,8 +119,8 @@ std::vector<TwoNearest> search_by_product(const std::vector<float>& base, const 
       cairn::NearestTwo<float> two;
       for (Eigen::Index i = 0; i < squares.size(); ++i)
         two.offer(static_cast<cairn::PointId>(i), squares(i) - 2 * products(i, q));
-      found.push_back(
-          {two.id(), std::sqrt(std::max(0.0F, two.first() + own)), std::sqrt(two.second() + own)});
+      found.push_back({two.id(), std::sqrt(std::max(0.0F, two.first_reduced() + own)),
+                       std::sqrt(two.second_reduced() + own)});
     }
   }
   return found;

@@ -224,8 +224,8 @@ private:
     for (std::size_t i = 0; i < queries.size(); i += 64) {
       axes.turn(&queries[i], turned);
       cairn::NearestTwo<float> two;
-      search_.search(index.trees(), turned, two, budget);
-      found.push_back({two.id(), std::sqrt(two.first()), std::sqrt(two.second())});
+      search_.search(index, turned, two, budget);
+      found.push_back({two.id(), two.first(), two.second()});
     }
     return found;
   }
@@ -260,7 +260,7 @@ private:
   }
 
   std::vector<Index> indices_;
-  cairn::BestBinFirst<Tree> search_;
+  cairn::BestBinFirst<Index> search_;
   std::vector<TwoNearest> found_;
   std::vector<TwoNearest> found_by_flann_;
 };

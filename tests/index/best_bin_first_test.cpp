@@ -61,8 +61,8 @@ TEST_SUITE("best_bin_first") {
           const auto expected = brute.nearest(query, 2);
           cairn::NearestTwo<float> two;
           CHECK(search.search(trees, query.data(), two));
-          CHECK(std::sqrt(two.first()) == doctest::Approx(expected[0].distance).epsilon(1e-4));
-          CHECK(std::sqrt(two.second()) == doctest::Approx(expected[1].distance).epsilon(1e-4));
+          CHECK(two.first() == doctest::Approx(expected[0].distance).epsilon(1e-4));
+          CHECK(two.second() == doctest::Approx(expected[1].distance).epsilon(1e-4));
         }
       }
   }

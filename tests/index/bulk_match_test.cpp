@@ -123,7 +123,7 @@ TEST_SUITE("bulk_match") {
       for (std::size_t i = 0; i < 400; ++i) {
         cairn::RatioTestMatch<float> verdict(test, cairn::L2{});
         tree.search(Rows<float>(queries, 3)[i], verdict);
-        if (verdict.accepted()) expected.push_back({i, verdict.id(), std::sqrt(verdict.first())});
+        if (verdict.accepted()) expected.push_back({i, verdict.id(), verdict.first()});
       }
       const auto matches = match(packed, Rows<float>(queries, 3), test);
       REQUIRE(matches.size() == expected.size());

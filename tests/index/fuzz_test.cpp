@@ -120,8 +120,8 @@ std::size_t search_tree(const std::string& shape, std::size_t count, std::size_t
 
     cairn::NearestTwo<Real> two;
     wrong += !best_bin_first.search(tree, query, two);
-    wrong += count > 0 && !same(std::sqrt(two.first()), expected[0]);
-    wrong += count > 1 && !same(std::sqrt(two.second()), expected[1]);
+    wrong += count > 0 && !same(two.first(), expected[0]);
+    wrong += count > 1 && !same(two.second(), expected[1]);
 
     cairn::NearestFirst order(tree, query);
     std::vector<cairn::Neighbor<Real>> ordered;

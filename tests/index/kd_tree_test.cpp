@@ -20,6 +20,7 @@
 #include "support/data.hpp"
 #include "support/folder.hpp"
 #include "support/random.hpp"
+#include "support/violation.hpp"
 
 namespace kd_tree_test {
 namespace {
@@ -196,6 +197,33 @@ TEST_SUITE("kd_tree") {
     });
     CHECK(seen == std::vector<int>(333, 1));
     CHECK(tree.nearest(cairn::Rows<float>(numbers, 3)[7])->id == 1021);
+  }
+
+  TEST_CASE("kd_tree: ids that are none, repeated or too few are refused before anything is read by them") {
+    using cairn_test::violation_of;
+    const std::vector<std::array<float, 2>> points(40, {1, 2});
+    std::vector<cairn::PointId> ids(40);
+    for (cairn::PointId i = 0; i < 40; ++i) ids[i] = 7 * i;
+    const auto build = [&] { cairn::KdTree<float, 2> tree(points, ids); };
+    CHECK(violation_of(build).empty());
+    ids[39] = 14;
+    CHECK(violation_of(build).find("an id can be given only once") != std::string::npos);
+    ids[39] = cairn::no_point;
+    CHECK(violation_of(build).find("no_point is none") != std::string::npos);
+    ids[39] = 4294967294U;  // the largest there is
+    CHECK(violation_of(build).empty());
+    ids[3] = 4294967294U;
+    CHECK(violation_of(build).find("an id can be given only once") != std::string::npos);
+    ids.resize(3);
+    CHECK(violation_of(build).find("one id a point") != std::string::npos);
+    ids.clear();
+    CHECK(violation_of(build).find("one id a point") != std::string::npos);
+    CHECK(violation_of([] {
+            static_cast<void>(cairn::KdTree<float>::from_rows({1, 2, 3}, 2));
+          }).find("whole rows") != std::string::npos);
+    CHECK(violation_of([] {
+            static_cast<void>(cairn::KdTree<float>::from_rows({1, 2, 3}, 0));
+          }).find("whole rows") != std::string::npos);
   }
 
   TEST_CASE("kd_tree: takes the containers people have") {

@@ -2,17 +2,23 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
 
+#include <cairn/index/axis_metrics.hpp>
 #include <cairn/index/best_bin_first.hpp>
+#include <cairn/index/bulk_match.hpp>
 #include <cairn/index/ratio_test.hpp>
 
 #include "index/generators.hpp"
 #include "support/random.hpp"
+#include "support/violation.hpp"
 
 namespace ratio_test_test {
 namespace {
@@ -55,6 +61,82 @@ TEST_SUITE("ratio_test") {
     }
     CHECK(accepted > 1000);
     CHECK(refused > 1000);
+  }
+
+  TEST_CASE("ratio_test: a second at exactly the ratio passes, written as second / first or first / second") {
+    // Distances 4 and 5: 1.25 one way, 0.8 the other.
+    for (const float ratio : {1.25F, 0.8F}) {
+      CAPTURE(ratio);
+      CHECK(shown<cairn::RatioTestMatch<float>>({16, 25}, {.ratio = ratio}).accepted());
+      CHECK(shown<cairn::RatioTestVerdict<float>>({16, 25}, {.ratio = ratio}).accepted());
+      CHECK(shown<cairn::RatioTestVerdict<float>>({25, 16}, {.ratio = ratio}).accepted());
+      CHECK_FALSE(shown<cairn::RatioTestMatch<float>>({16, 24.9F}, {.ratio = ratio}).accepted());
+      CHECK_FALSE(shown<cairn::RatioTestVerdict<float>>({24.9F, 16}, {.ratio = ratio}).accepted());
+    }
+    CHECK(cairn::RatioTest{.ratio = 0.8F}.least_ratio() == 1.25F);
+    CHECK(cairn::RatioTest{.ratio = 2}.least_ratio() == 2);
+  }
+
+  TEST_CASE("ratio_test: below 1 and above, random lists are judged as by their true distances") {
+    const std::uint64_t seed = cairn_test::seed(63);
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    int accepted = 0;
+    for (int round = 0; round < 20000; ++round) {
+      std::vector<double> distances(1 + random.below(5));
+      std::vector<float> reduced;
+      for (double& distance : distances) {
+        distance = static_cast<double>(random.below(20));
+        reduced.push_back(static_cast<float>(distance * distance));
+      }
+      std::sort(distances.begin(), distances.end());
+      const double second = distances.size() > 1 ? distances[1] : std::numeric_limits<double>::infinity();
+      // Ratios of the small whole numbers are not met but for 4/5 and 1/2, which are exact.
+      const std::array<double, 4> lowe{0.8, 0.5, 0.7003, 0.9001};
+      const double ratio = lowe[random.below(4)];
+      const bool expected = distances[0] <= ratio * second && distances[0] < second;
+      const auto written = static_cast<float>(round % 2 == 0 ? ratio : 1 / ratio);
+      REQUIRE(shown<cairn::RatioTestMatch<float>>(reduced, {.ratio = written}).accepted() == expected);
+      REQUIRE(shown<cairn::RatioTestVerdict<float>>(reduced, {.ratio = written}).accepted() == expected);
+      accepted += expected;
+    }
+    CHECK(accepted > 1000);
+  }
+
+  TEST_CASE("ratio_test: true distances are told, and a largest one is met exactly") {
+    const auto two = shown<cairn::RatioTestMatch<float>>({9, 49, 64}, {.ratio = 1.5F, .max_distance = 3});
+    CHECK(two.accepted());
+    CHECK(two.first() == 3);
+    CHECK(std::isinf(two.second()));  // nothing within 1.5 * 3 was met
+    CHECK(two.first_reduced() == 9);
+    CHECK_FALSE(
+        shown<cairn::RatioTestMatch<float>>({9, 49}, {.ratio = 1.5F, .max_distance = 2.999F}).accepted());
+    const float root = std::sqrt(0.3F);  // its square is not 0.3F: what is compared is what is told
+    CHECK(shown<cairn::RatioTestMatch<float>>({0.3F}, {.max_distance = root}).accepted());
+    CHECK_FALSE(
+        shown<cairn::RatioTestMatch<float>>({0.3F}, {.max_distance = std::nextafter(root, 0.0F)}).accepted());
+  }
+
+  TEST_CASE("ratio_test: ratios that are none are refused") {
+    const float nan = std::numeric_limits<float>::quiet_NaN();
+    const cairn::PackedPoints packed(std::vector<std::array<float, 1>>{{1}, {2}});
+    const std::vector<std::array<float, 1>> queries{{1}};
+    for (const float ratio : {0.0F, -0.8F, nan, std::numeric_limits<float>::infinity(), 1e-30F}) {
+      const cairn::RatioTest test{.ratio = ratio};
+      CHECK(cairn_test::violation_of([&] {
+              static_cast<void>(match(packed, queries, test));
+            }).find("the ratio of distances") != std::string::npos);
+      CHECK(cairn_test::violation_of([&] {
+              static_cast<void>(match(cairn::PackedPoints(), queries, test));
+            }).find("the ratio of distances") != std::string::npos);
+    }
+    for (const float most : {-1.0F, nan})
+      CHECK(cairn_test::violation_of([&] {
+              static_cast<void>(match(packed, queries, {.max_distance = most}));
+            }).find("max_distance must not be negative") != std::string::npos);
+    CHECK(cairn::detail::is_homogeneous<cairn::WeightedL2<3>>);
+    CHECK_FALSE(cairn::detail::is_homogeneous<cairn::Angular>);  // twice the angle is not twice the chord
+    CHECK_FALSE(cairn::detail::is_homogeneous<cairn::Weighted<cairn::Angular, 3>>);
   }
 
   TEST_CASE("ratio_test: the early verdict saves leaves, in one tree and in several") {

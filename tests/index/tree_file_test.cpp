@@ -3,8 +3,11 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
+#include <limits>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -32,6 +35,24 @@ std::string refusal(const std::string& bytes) {
     std::istringstream in(bytes);
     static_cast<void>(cairn::load_tree<T>(in, "a.tree"));
   });
+}
+
+/// The file with other numbers in it and the checksum that belongs to them, computed here anew: FNV-1a of all
+/// but the first eight bytes and itself.
+std::string signed_anew(std::string bytes) {
+  std::uint64_t sum = 14695981039346656037ULL;
+  for (std::size_t at = 8; at < bytes.size(); ++at) {
+    if (at >= 32 && at < 40) continue;
+    sum ^= static_cast<unsigned char>(bytes[at]);
+    sum *= 1099511628211ULL;
+  }
+  for (std::size_t i = 0; i < 8; ++i) bytes[32 + i] = static_cast<char>(sum >> (8 * i) & 255U);
+  return bytes;
+}
+template <class Number>
+std::string with(std::string bytes, std::size_t at, Number number) {
+  std::memcpy(bytes.data() + at, &number, sizeof(number));
+  return signed_anew(std::move(bytes));
 }
 
 Tree make_tree(std::size_t count) {
@@ -100,6 +121,39 @@ TEST_SUITE("tree_file") {
       if (damaged == bytes) continue;
       REQUIRE(refusal<cairn::KdTree<float>>(damaged).find("a.tree: ") == 0);
     }
+  }
+
+  TEST_CASE(
+      "tree_file: ids and coordinates that no tree can have are refused, though the checksum is right") {
+    const std::string bytes = saved(make_tree(40));
+    constexpr std::size_t ids = 40, rows = 40 + 4 * 40;
+    std::uint32_t first = 0;
+    std::memcpy(&first, bytes.data() + ids, 4);
+    CHECK(refusal(signed_anew(bytes)).empty());
+    CHECK(refusal(with(bytes, ids + 4 * 7, std::uint32_t{2})).empty());
+    CHECK(refusal(with(bytes, ids + 4 * 7, cairn::no_point)) ==
+          "a.tree: point 7 has the id 4294967295, expected one that no other point has and that is below "
+          "4294967295");
+    CHECK(refusal(with(bytes, ids + 4 * 39, first)).find("a.tree: point 39 has the id") == 0);
+    const std::string sparse = with(bytes, ids, 4000000000U);
+    CHECK(refusal(sparse).empty());
+    CHECK(refusal(with(sparse, ids + 4 * 3, 4000000000U)).find("a.tree: point 3 has the id 4000000000") == 0);
+    for (const float bad :
+         {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity(), -1e30F})
+      CHECK(refusal(with(bytes, rows + 4 * (3 * 9 + 2), bad)).find("a.tree: point 9, coordinate 2 is") == 0);
+    const std::string of_dimension_0 = with(bytes.substr(0, rows), 16, std::uint64_t{0});
+    CHECK(refusal<cairn::KdTree<float>>(of_dimension_0) == "a.tree: dimension 0, expected at least 1");
+  }
+
+  TEST_CASE("tree_file: trees of other coordinates come back too") {
+    const std::vector<std::array<double, 2>> doubles{{691607.00, 5334762.00}, {691607.02, 5334762.00}};
+    const std::vector<std::array<std::int16_t, 2>> words{{-32768, 32767}, {3, 4}};
+    std::ostringstream out;
+    cairn::save_tree(out, cairn::KdTree<double, 2>(doubles));
+    cairn::save_tree(out, cairn::KdTree<std::int16_t, 2>(words));
+    std::istringstream in(out.str());
+    CHECK(cairn::load_tree<cairn::KdTree<double, 2>>(in, "memory").nearest(doubles[1])->id == 1);
+    CHECK(cairn::load_tree<cairn::KdTree<std::int16_t, 2>>(in, "memory").nearest(words[0])->distance == 0);
   }
 
   TEST_CASE("tree_file: what is foreign is refused by what it is") {

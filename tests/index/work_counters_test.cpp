@@ -51,6 +51,23 @@ void check(const Cost& cost, const Cost& counted) {
   CHECK(cost.leaves <= 1.03 * counted.leaves);
 }
 
+/// Mean work of finding the 50 nearest of points whose first four of twelve coordinates matter.
+Cost cost_of_splits() {
+  cairn::Random random(3);
+  std::vector<float> rows(12 * count / 4), queries(12 * query_count);
+  for (std::vector<float>* numbers : {&rows, &queries})
+    for (std::size_t i = 0; i < numbers->size(); ++i)
+      (*numbers)[i] = static_cast<float>(random.uniform() * (i % 12 < 4 ? 1 : 0.01));
+  const cairn::KdTree<float, 12> tree(cairn::Rows<float>(rows, 12));
+  cairn::Work work;
+  std::array<cairn::Neighbor<float>, 50> found;
+  for (std::size_t i = 0; i < query_count; ++i) {
+    cairn::KNearest<float> nearest(found.data(), found.size());
+    tree.search(cairn::Rows<float>(queries, 12)[i], nearest, &work);
+  }
+  return {static_cast<double>(work.nodes) / query_count, static_cast<double>(work.leaves) / query_count};
+}
+
 Tree tree_of(const char* shape) {
   cairn::Random random(1);
   return Tree(cairn::Rows<float>(cairn_test::make_points<float>(shape, count, 3, random), 3));
@@ -81,6 +98,10 @@ TEST_SUITE("work_counters") {
     const Tree clusters = tree_of("clusters");
     check(cost_of(clusters, "clusters", 10), {5.03, 6.79});
     CHECK(static_cast<double>(uniform.bytes()) / count < 12 + 6.3);
+  }
+
+  TEST_CASE("work_counters: a query of a tree searched split by split") {
+    check(cost_of_splits(), {63.9, 33.6});
   }
 
   TEST_CASE("work_counters: a growing map, by both rules, with merges done and under way") {

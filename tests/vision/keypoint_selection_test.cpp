@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <limits>
+#include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -73,6 +75,20 @@ TEST_SUITE("keypoint_selection") {
         });
         CHECK(in_cell[static_cast<std::size_t>(row * 4 + column)] >= std::min<std::ptrdiff_t>(50, available));
       }
+  }
+
+  TEST_CASE("keep_strongest_spread: of more cells than are kept none has a share, however many there are") {
+    const std::uint64_t seed = cairn_test::seed();
+    CAPTURE(seed);
+    std::vector<cairn::Keypoint> strongest = scattered(500, seed);
+    cairn::keep_strongest(strongest, 60);
+    const int most = std::numeric_limits<int>::max();
+    for (const auto& [columns, rows] : {std::pair{61, 1}, {8, 8}, {65536, 65536}, {most, most}, {most, 2}}) {
+      CAPTURE(columns);
+      std::vector<cairn::Keypoint> kept = scattered(500, seed);
+      cairn::keep_strongest_spread(kept, 60, 100, 80, columns, rows);
+      CHECK(kept == strongest);
+    }
   }
 
   TEST_CASE("AdaptiveThreshold: settles within its tolerance where the number falls with the threshold") {

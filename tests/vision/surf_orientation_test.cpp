@@ -1,7 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
+#include <vector>
 
 #include <doctest/doctest.h>
 
@@ -33,6 +36,54 @@ cairn::detail::PlaneVector slow_longest_sector(const Directions& vectors) {
     if (std::hypot(sum.x, sum.y) > std::hypot(best.x, best.y)) best = sum;
   }
   return best;
+}
+
+/// The definition, by loops over cells in doubles: Haar responses of side 4 at distances of 1 inside the
+/// radius 6, each weighted by a Gaussian of 2.5, and their sums over a sixth of the circle from each of them
+/// on.
+std::vector<cairn::detail::PlaneVector> sector_sums(const CellGrid<35>& grid) {
+  const auto cell = [&](int column, int row) {  // centred on whole numbers about the middle
+    return double{grid.row(row + 17)[column + 17]};
+  };
+  std::vector<cairn::detail::PlaneVector> responses;
+  for (double y = -5.5; y < 6; ++y)
+    for (double x = -5.5; x < 6; ++x) {
+      if (x * x + y * y >= 36) continue;
+      cairn::detail::PlaneVector response;
+      for (int row = -10; row <= 10; ++row)
+        for (int column = -10; column <= 10; ++column) {
+          if (std::abs(row - y) > 2 || std::abs(column - x) > 2) continue;
+          response.x += column > x ? cell(column, row) : -cell(column, row);
+          response.y += row > y ? cell(column, row) : -cell(column, row);
+        }
+      const double weight = std::exp(-0.5 * (x * x + y * y) / (2.5 * 2.5));
+      responses.push_back({weight * response.x, weight * response.y});
+    }
+  std::vector<cairn::detail::PlaneVector> sums;
+  for (const auto& first : responses) {
+    cairn::detail::PlaneVector sum;
+    for (const auto& other : responses) {
+      double turn = std::atan2(other.y, other.x) - std::atan2(first.y, first.x);
+      if (turn < 0) turn += 2 * std::numbers::pi;
+      if (turn >= std::numbers::pi / 3) continue;
+      sum.x += other.x;
+      sum.y += other.y;
+    }
+    sums.push_back(sum);
+  }
+  return sums;
+}
+
+/// How far an angle is from that of a longest sum; of sums equally long to 1e-5 the nearest counts.
+double turned_from_longest(double angle, const std::vector<cairn::detail::PlaneVector>& sums) {
+  double longest = 0;
+  for (const auto& sum : sums) longest = std::max(longest, std::hypot(sum.x, sum.y));
+  double least = 10;
+  for (const auto& sum : sums)
+    if (std::hypot(sum.x, sum.y) > (1 - 1e-5) * longest)
+      least =
+          std::min(least, std::abs(std::remainder(std::atan2(sum.y, sum.x) - angle, 2 * std::numbers::pi)));
+  return least;
 }
 
 }  // namespace
@@ -69,6 +120,22 @@ TEST_SUITE("surf_orientation") {
     vectors.find_orders();
     CHECK(cairn::detail::longest_sector(vectors).x == doctest::Approx(-2.0 * Directions::count));
     CHECK(cairn::detail::longest_sector(vectors).y == doctest::Approx(-1.0 * Directions::count));
+  }
+
+  TEST_CASE("dominant_angle: is that of the definition computed slowly in doubles, to 1e-4") {
+    const std::uint64_t seed = cairn_test::seed(2);
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    for (int trial = 0; trial < 100; ++trial) {
+      CellGrid<35> cells;
+      const double slope = random.uniform(-3, 3), slant = random.uniform(-3, 3);
+      for (int j = 0; j < 35; ++j)
+        for (int i = 0; i < 35; ++i)
+          cells.row(j)[i] = static_cast<float>(slope * i + slant * j + 20 * random.normal());
+      CAPTURE(trial);
+      const double angle = double{cairn::detail::dominant_angle(cells)};
+      REQUIRE(turned_from_longest(angle, sector_sums(cells)) < 1e-4);
+    }
   }
 
   TEST_CASE("dominant_angle: points up the slope of an even ramp, and is 0 on a plain") {

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -212,6 +213,19 @@ TEST_SUITE("surf") {
     std::vector<std::uint8_t> padded(240 * 333, 77);
     for (int y = 0; y < 240; ++y) std::copy_n(image.row(y), 320, padded.begin() + y * 333);
     CHECK(same(cairn::surf({padded.data(), 320, 240, 333}, options), some));
+  }
+
+  TEST_CASE("surf: a grid of any number of cells is taken, and one of more than are kept changes nothing") {
+    const cairn::Image image = texture(200, 160, 13);
+    const int most = std::numeric_limits<int>::max();
+    const cairn::Features strongest = cairn::surf(image, {.target_count = 40});
+    REQUIRE(strongest.size() == 40);
+    for (const auto& [columns, rows] : {std::pair{65536, 65536}, {most, most}, {46341, 46341}, {1, most}}) {
+      CAPTURE(columns);
+      CHECK(same(strongest,
+                 cairn::surf(image, {.target_count = 40, .grid_columns = columns, .grid_rows = rows})));
+    }
+    CHECK_FALSE(same(strongest, cairn::surf(image, {.target_count = 40, .grid_columns = 1, .grid_rows = 8})));
   }
 
   TEST_CASE("surf: detect and describe together give what the call does") {

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "study/store.hpp"
 
-#include <cmath>
 #include <vector>
 
 #include <cairn/index/best_bin_first.hpp>
@@ -15,7 +14,7 @@ namespace {
 using cairn::NearestTwo;
 
 Found found_by(const NearestTwo<float>& two) {
-  return {two.id(), std::sqrt(two.first()), std::sqrt(two.second())};
+  return {two.id(), two.first(), two.second()};
 }
 
 /// Exact search of few numbers, in a tree or a forest.
@@ -26,19 +25,18 @@ Found search_exactly(const Index& index, const float* query, std::size_t dim, ca
   return found_by(two);
 }
 
-/// Best-bin-first with one queue for all trees.
-template <class Tree>
+/// Best-bin-first, with one queue for all trees of a forest.
+template <class Index>
 class BudgetedSearch {
 public:
-  Found operator()(std::span<const Tree* const> trees, const float* query, std::size_t leaves,
-                   cairn::Work& work) {
+  Found operator()(const Index& index, const float* query, std::size_t leaves, cairn::Work& work) {
     NearestTwo<float> two;
-    search_.search(trees, query, two, {.leaves = leaves}, &work);
+    search_.search(index, std::span(query, index.dimension()), two, {.leaves = leaves}, &work);
     return found_by(two);
   }
 
 private:
-  cairn::BestBinFirst<Tree> search_;
+  cairn::BestBinFirst<Index> search_;
 };
 
 template <std::size_t Dim>
@@ -53,8 +51,7 @@ public:
   }
   Found search(const float* query) override {
     if constexpr (Dim == 3) return search_exactly(tree_, query, options_.dim, work);
-    const cairn::KdTree<float, Dim>* const trees[] = {&tree_};
-    return budgeted_(trees, query, options_.leaves, work);
+    return budgeted_(tree_, query, options_.leaves, work);
   }
   [[nodiscard]] std::size_t bytes() const override {
     return tree_.bytes() + rows_.capacity() * sizeof(float);
@@ -80,16 +77,16 @@ public:
     if constexpr (Dim == 3)
       return search_exactly(index_, query, options_.dim, work);
     else
-      return budgeted_(index_.trees(), query, options_.leaves, work);
+      return budgeted_(index_, query, options_.leaves, work);
   }
   [[nodiscard]] std::size_t bytes() const override { return index_.bytes(); }
   [[nodiscard]] std::uint64_t points_moved() const override { return index_.points_moved(); }
-  [[nodiscard]] std::size_t trees() const override { return index_.trees().size(); }
+  [[nodiscard]] std::size_t trees() const override { return index_.tree_count(); }
 
 private:
   StoreOptions options_;
   cairn::MultiKdTree<float, Dim> index_;
-  BudgetedSearch<cairn::KdTree<float, Dim>> budgeted_;
+  BudgetedSearch<cairn::MultiKdTree<float, Dim>> budgeted_;
 };
 
 /// Points in blocks of sixteen, coordinate by coordinate, as the leaves of a tree hold them.

@@ -63,6 +63,7 @@ struct Weighted {
   [[no_unique_address]] Base base{};
 
   static constexpr bool additive = detail::is_additive<Base>;
+  static constexpr bool homogeneous = detail::is_homogeneous<Base>;
 
   template <class Number>
   [[gnu::always_inline]] void accumulate(Number& sum, const Number& difference,
@@ -106,6 +107,7 @@ struct Circular {
   [[no_unique_address]] Base base{};
 
   static constexpr bool additive = detail::is_additive<Base>;
+  static constexpr bool homogeneous = detail::is_homogeneous<Base>;
 
   [[nodiscard]] Real period(std::size_t axis) const noexcept { return periods[axis]; }
 

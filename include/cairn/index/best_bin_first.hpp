@@ -40,6 +40,7 @@ public:
   template <Collector<Real> C>
   bool search(std::span<const Tree* const> trees, const Real* query, C& collector, Budget budget = {},
               Work* work = nullptr) {
+    detail::check_collector<C, typename Tree::Measure>();
     query = wrapped(trees, query);
     return search_each(trees, [query](std::size_t) { return query; }, collector, budget, work);
   }
@@ -50,6 +51,7 @@ public:
     requires(!detail::HasPeriods<typename Tree::Measure>)
   bool search(std::span<const Tree* const> trees, std::span<const Real* const> queries, C& collector,
               Budget budget = {}, Work* work = nullptr) {
+    detail::check_collector<C, typename Tree::Measure>();
     CAIRN_EXPECTS(queries.size() == trees.size(), "BestBinFirst: there must be one query a tree");
     return search_each(trees, [queries](std::size_t i) { return queries[i]; }, collector, budget, work);
   }

@@ -157,7 +157,7 @@ private:
     return (walk.node_of[walk.level] << fan_bits(walk.level)) + lane;
   }
   [[nodiscard]] std::size_t leaf_of(std::size_t child) const noexcept {
-    return (child * layout_.leaves()) >> layout_.depth();
+    return layout_.first_leaf(layout_.depth(), child);
   }
 
   /// A key's lower bound: its number without the child in the last four bits. NaN stands for `none`.

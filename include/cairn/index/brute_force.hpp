@@ -25,10 +25,12 @@ class BruteForce {
 public:
   using Real = detail::RealOf<Scalar>;
   using Hit = Neighbor<Real>;
+  static_assert(detail::is_coordinate<Scalar>,
+                "coordinates are kept as float, double or whole numbers of up to four bytes");
 
   BruteForce() = default;
 
-  /// Throws Error, naming the point, for a coordinate that is not finite.
+  /// Throws Error, naming the point, for a coordinate that is not finite or cannot be kept.
   template <PointSet Points>
   explicit BruteForce(const Points& points, M metric = {})
       : metric_(std::move(metric)),
@@ -67,7 +69,7 @@ public:
   [[nodiscard]] std::vector<Hit> within(const Query& query, Real radius) const {
     CAIRN_EXPECTS(radius >= 0, "BruteForce::within: a radius is not negative");
     std::vector<Hit> found;
-    Within<Real> collector(found, metric_.reduce(radius));
+    Within<Real> collector(found, detail::largest_reduced(metric_, radius));
     search(query, collector);
     for (Hit& hit : found) hit.distance = metric_.restore(hit.distance);
     std::sort(found.begin(), found.end(), nearer<Real>);
@@ -77,6 +79,7 @@ public:
   /// Offers every point that is nearer than the collector's limit, in the order of the set.
   template <Point Query, Collector<Real> C>
   void search(const Query& query, C& collector, Work* work = nullptr) const {
+    detail::check_collector<C, M>();
     if (empty()) return;
     std::vector<Real> row(dim_);
     detail::copy_point<Real>(query, dim_, row.data(), {"BruteForce: query", 0});
@@ -95,5 +98,8 @@ private:
   std::size_t dim_ = 0;
   std::vector<Scalar> rows_;
 };
+
+template <PointSet Points, class M = L2>
+BruteForce(const Points&, M = {}) -> BruteForce<detail::CoordinateOf<Points>, dynamic_dim, M>;
 
 }  // namespace cairn::inline CAIRN_ABI

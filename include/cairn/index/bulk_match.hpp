@@ -8,7 +8,7 @@
 /// ```cpp
 /// const cairn::PackedPoints map(descriptors);  // any PointSet
 /// for (const auto& two : cairn::nearest_two(map, queries)) look_at(two);
-/// for (const auto& match : cairn::match(map, queries, {.ratio = 1.25F}))  // those that pass the ratio test
+/// for (const auto& match : cairn::match(map, queries, {.ratio = 1.25F}))  // or 0.8F: the same
 ///   look_at(match);
 /// ```
 ///
@@ -32,6 +32,7 @@
 #include <vector>
 
 #include <cairn/core/parallel.hpp>
+#include <cairn/core/sizes.hpp>
 #include <cairn/index/block_lanes.hpp>
 #include <cairn/index/metric.hpp>
 #include <cairn/index/neighbors.hpp>
@@ -50,8 +51,8 @@ public:
   explicit PackedPoints(const Points& points)
       : dim_(detail::dimension_of<dynamic_dim>(points)), count_(static_cast<std::size_t>(points.size())) {
     const auto rows = detail::copy_points<float>(points, dim_, "PackedPoints: point");
-    const std::size_t blocks = (count_ + detail::block_size - 1) / detail::block_size;
-    coordinates_.resize(blocks * detail::block_size * dim_);
+    const std::size_t blocks = count_ / detail::block_size + (count_ % detail::block_size != 0);
+    coordinates_.resize(detail::room_for(blocks * detail::block_size, dim_, "PackedPoints"));
     squares_.resize(blocks * detail::block_size);
     for (std::size_t i = 0; i < blocks * detail::block_size; ++i) pack(rows, i);
   }
@@ -177,7 +178,7 @@ template <std::size_t Tile>
                                                float* packed) {
   constexpr std::size_t panel_bytes = 256 * 1024;
   const std::size_t dim = points.dimension();
-  const std::size_t panel = std::max<std::size_t>(1, panel_bytes / (block_size * sizeof(float) * dim));
+  const std::size_t panel = std::max<std::size_t>(1, panel_bytes / (block_size * sizeof(float)) / dim);
   for (std::size_t q = 0; q < (queries.size() + Tile - 1) / Tile * Tile; ++q)
     for (std::size_t a = 0; a < dim; ++a)
       packed[q / Tile * Tile * dim + a * Tile + q % Tile] = queries[std::min(q, queries.size() - 1)].row[a];
@@ -230,7 +231,7 @@ template <PointSet Queries>
   BulkAnswers answers = open_queries(points, queries);
   const std::size_t count = answers.queries.size();
   parallel_for((count + bulk_group - 1) / bulk_group, threads, [&](std::size_t begin, std::size_t end) {
-    std::vector<float> packed(bulk_group * points.dimension());
+    std::vector<float> packed(room_for(bulk_group, points.dimension(), "nearest_two"));
     for (std::size_t first = begin * bulk_group; first < std::min(count, end * bulk_group);
          first += bulk_group)
       match_group(points, std::span(answers.queries).subspan(first, std::min(bulk_group, count - first)),
@@ -252,7 +253,7 @@ template <PointSet Queries>
   const auto answers = detail::answer_all(points, queries, threads);
   for (std::size_t i = 0; i < found.size(); ++i) {
     const auto& two = answers.queries[i].two;
-    found[i] = {two.id(), two.second_id(), std::sqrt(two.first()), std::sqrt(two.second())};
+    found[i] = {two.id(), two.second_id(), two.first(), two.second()};
   }
   return found;
 }
@@ -261,15 +262,16 @@ template <PointSet Queries>
 template <PointSet Queries>
 [[nodiscard]] std::vector<Match> match(const PackedPoints& points, const Queries& queries,
                                        const RatioTest& test = {}, unsigned threads = 1) {
+  detail::check_ratio_test(test);
   std::vector<Match> matches;
   if (points.empty()) return matches;
   const auto answers = detail::answer_all(points, queries, threads);
   for (std::size_t i = 0; i < answers.queries.size(); ++i) {
     const auto& two = answers.queries[i].two;
     RatioTestMatch<float> verdict(test, L2{});
-    verdict.offer(two.id(), two.first());
-    if (two.second_id() != no_point) verdict.offer(two.second_id(), two.second());
-    if (verdict.accepted()) matches.push_back({i, two.id(), std::sqrt(two.first())});
+    verdict.offer(two.id(), two.first_reduced());
+    if (two.second_id() != no_point) verdict.offer(two.second_id(), two.second_reduced());
+    if (verdict.accepted()) matches.push_back({i, two.id(), two.first()});
   }
   return matches;
 }

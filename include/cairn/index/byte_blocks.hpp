@@ -22,6 +22,7 @@
 #include <immintrin.h>
 #endif
 
+#include <cairn/core/sizes.hpp>
 #include <cairn/index/block_lanes.hpp>
 
 namespace cairn::inline CAIRN_ABI::detail {
@@ -167,12 +168,14 @@ public:
 
   /// Room for some blocks, not yet written.
   ByteBlocks(std::size_t dim, std::size_t blocks)
-      : dim_(dim), codes_(blocks * groups() * 64), constants_(blocks * block_size) {}
+      : dim_(dim),
+        codes_(room_for(blocks, groups() * 64, "DescriptorIndex")),
+        constants_(room_for(blocks, block_size, "DescriptorIndex")) {}
 
   /// Of `count` points, at least one, row_of(i) being the bytes of point i; the last block repeats the last.
   template <class RowOf>
   [[nodiscard]] static ByteBlocks of_rows(std::size_t dim, std::size_t count, const RowOf& row_of) {
-    ByteBlocks result(dim, (count + block_size - 1) / block_size);
+    ByteBlocks result(dim, count / block_size + (count % block_size != 0));
     for (std::size_t place = 0; place < result.blocks() * block_size; ++place)
       result.set(place, row_of(std::min(place, count - 1)));
     return result;

@@ -101,6 +101,7 @@ public:
     template <Point Query, Collector<float> C>
     bool search(const DescriptorIndex& index, const Query& query, C& collector, Budget budget = {},
                 Work* work = nullptr, std::size_t* measured = nullptr) {
+      detail::check_collector<C, L2>();
       if (index.empty()) return true;
       row_.resize(index.dimension());
       codes_.resize(index.dimension());

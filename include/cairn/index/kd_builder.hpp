@@ -48,15 +48,15 @@ public:
   }
 
   /// One piece of the work, as many points moved or written as is returned; 0 when nothing is left.
-  std::size_t advance() {
+  std::uint64_t advance() {
     if (stage_ == Stage::gathering) start();
     if (stage_ == Stage::splitting) return split_next();
     if (stage_ == Stage::boxing) return box_next();
     return 0;
   }
   /// The sum of what advance() will return for so many points, to within a few per cent.
-  [[nodiscard]] static std::size_t work(std::size_t points) noexcept {
-    return points * (KdLayout(points).depth() + 2);
+  [[nodiscard]] static std::uint64_t work(std::size_t points) noexcept {
+    return std::uint64_t{points} * (KdLayout(points).depth() + 2);
   }
 
   /// Does what is left and hands over the tree.
@@ -113,15 +113,15 @@ private:
     parts_.blocks.fill(points_, parts_.layout, parts_.layout.leaves_below(at.depth, at.slot));
   }
 
-  std::size_t split_next() {
+  std::uint64_t split_next() {
     const Slot at = todo_.back();
     todo_.pop_back();
     const KdLayout& layout = parts_.layout;
     const Range leaves = layout.leaves_below(at.depth, at.slot);
-    std::size_t moved = 0;
+    std::uint64_t moved = 0;
     if (leaves.size() <= leaves_in_piece) {
       make_leaves(at, scratch_);
-      moved = (layout.first_point(leaves.end) - layout.first_point(leaves.begin)) *
+      moved = std::uint64_t{layout.first_point(leaves.end) - layout.first_point(leaves.begin)} *
               (layout.depth() - at.depth + 1);
     } else {
       moved = split(at, scratch_);
@@ -137,10 +137,10 @@ private:
     stage_ = parts_.boxes.last_nodes() == 0 ? Stage::done : Stage::boxing;
   }
 
-  std::size_t box_next() {
+  std::uint64_t box_next() {
     const std::size_t end = std::min(boxed_ + nodes_in_piece, parts_.boxes.last_nodes());
     parts_.boxes.fill_last(parts_.blocks, {boxed_, end});
-    const std::size_t points = (end - boxed_) * parts_.layout.points() / parts_.boxes.last_nodes();
+    const std::size_t points = share(parts_.layout.points(), end - boxed_, parts_.boxes.last_nodes());
     boxed_ = end;
     if (boxed_ == parts_.boxes.last_nodes()) {
       parts_.boxes.fill_above();

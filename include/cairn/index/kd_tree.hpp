@@ -5,7 +5,7 @@
 /// A static balanced kd-tree, built once, that owns its points in leaf order.
 ///
 /// ```cpp
-/// const cairn::KdTree<float, 3> tree(points);  // any PointSet
+/// const cairn::KdTree<float, 3> tree(points);  // any PointSet; KdTree tree(points) keeps its numbers
 /// if (const auto hit = tree.nearest(query)) use(hit->id, hit->distance);
 /// for (const auto& [id, distance] : tree.nearest(query, 10)) use(id, distance);
 /// for (const auto& [id, distance] : tree.within(query, 0.5F)) use(id, distance);
@@ -15,8 +15,9 @@
 /// Up to eight dimensions exact search runs over nodes of sixteen boxes (box_tree.hpp); above, over single
 /// splits with the distance to the cell kept up to date (Arya and Mount, "Algorithms for fast vector
 /// quantization", DCC 1993); for a budget instead of exactness see best_bin_first.hpp. Ids are the positions
-/// of the points in the set, or the caller's own. Depth is ceil(log2(n / 16)) whatever the points.
-/// Const methods may run at the same time. Searching allocates nothing up to 160 dimensions.
+/// of the points in the set, or the caller's own: different numbers, not no_point. Depth is ceil(log2(n /
+/// 16)) whatever the points. Const methods may run at the same time. Searching allocates nothing up to 160
+/// dimensions.
 #pragma once
 
 #include <algorithm>
@@ -37,6 +38,7 @@
 #include <cairn/index/leaf_blocks.hpp>
 #include <cairn/index/metric.hpp>
 #include <cairn/index/neighbors.hpp>
+#include <cairn/index/point_ids.hpp>
 #include <cairn/index/points.hpp>
 
 namespace cairn::inline CAIRN_ABI {
@@ -46,8 +48,8 @@ struct BuildOptions {
   unsigned threads = 1;
 };
 
-/// Scalar: float, double or std::uint8_t coordinates. Dim: number of coordinates, or dynamic_dim. Distances
-/// are float, for double coordinates double.
+/// Scalar: float or double coordinates, or whole numbers of up to four bytes. Dim: number of coordinates, or
+/// dynamic_dim. Distances are float; double for coordinates that are double or whole numbers of four bytes.
 template <class Scalar = float, std::size_t Dim = dynamic_dim, class M = L2>
 class KdTree {
 public:
@@ -56,32 +58,37 @@ public:
   using Coordinate = Scalar;
   using Measure = M;
   static constexpr std::size_t fixed_dimension = Dim;
+  static_assert(detail::is_coordinate<Scalar>,
+                "coordinates are kept as float, double or whole numbers of up to four bytes");
   static_assert(Metric<M, Real>, "the third argument of KdTree must satisfy cairn::Metric");
 
   /// A tree of nothing: every search comes back empty.
   KdTree() = default;
 
   /// Builds from a set of points, ids 0 ... n - 1. Throws Error, naming the point, for a coordinate that is
-  /// not finite (or so large that squares overflow) and for points of different dimensions. O(n log n).
+  /// not finite (or so large that squares overflow; or, for whole Scalars, none of theirs) and for points of
+  /// different dimensions. O(n log n).
   template <PointSet Points>
   explicit KdTree(const Points& points, M metric = {}, BuildOptions options = {})
       : KdTree(detail::copy_points<Scalar>(points, detail::dimension_of<Dim>(points), "KdTree: point"), {},
                detail::dimension_of<Dim>(points), std::move(metric), options.threads) {}
 
-  /// The same with the caller's ids, one a point, none of them no_point.
+  /// The same with the caller's ids, one a point, all different, none of them no_point.
   template <PointSet Points>
   KdTree(const Points& points, std::span<const PointId> ids, M metric = {}, BuildOptions options = {})
-      : KdTree(detail::copy_points<Scalar>(points, detail::dimension_of<Dim>(points), "KdTree: point"), ids,
-               detail::dimension_of<Dim>(points), std::move(metric), options.threads) {
-    CAIRN_EXPECTS(ids.size() == size(), "KdTree: there must be one id a point");
-  }
+      : KdTree(detail::copy_points<Scalar>(points, detail::dimension_of<Dim>(points), "KdTree: point"),
+               checked(ids, static_cast<std::size_t>(points.size())), detail::dimension_of<Dim>(points),
+               std::move(metric), options.threads) {}
 
-  /// The same from rows of `dim` numbers that are known to be finite; ids as above, or empty for 0 ... n - 1.
+  /// The same from rows of `dim` numbers that are known to be usable; ids, known to be so, as above, or empty
+  /// for 0 ... n - 1.
   [[nodiscard]] static KdTree from_rows(std::vector<Scalar> rows, std::size_t dim,
                                         std::span<const PointId> ids = {}, M metric = {},
                                         BuildOptions options = {}) {
     CAIRN_EXPECTS(Dim == dynamic_dim || dim == Dim, "KdTree::from_rows: the dimension is fixed by the type");
-    CAIRN_EXPECTS(ids.empty() || ids.size() * dim == rows.size(), "KdTree: there must be one id a point");
+    CAIRN_EXPECTS(rows.empty() || (dim > 0 && rows.size() % dim == 0),
+                  "KdTree::from_rows: the numbers must be whole rows");
+    CAIRN_EXPECTS(ids.empty() || ids.size() == rows.size() / dim, "KdTree: there must be one id a point");
     return KdTree(std::move(rows), ids, dim, std::move(metric), options.threads);
   }
 
@@ -138,7 +145,7 @@ public:
   [[nodiscard]] std::vector<Hit> within(const Query& query, Real radius) const {
     CAIRN_EXPECTS(radius >= 0, "KdTree::within: a radius is not negative");
     std::vector<Hit> found;
-    Within<Real> collector(found, metric_.reduce(radius));
+    Within<Real> collector(found, detail::largest_reduced(metric_, radius));
     search(query, collector);
     for (Hit& hit : found) hit.distance = metric_.restore(hit.distance);
     std::sort(found.begin(), found.end(), nearer<Real>);
@@ -149,6 +156,7 @@ public:
   /// `work` what was done. Throws Error where a coordinate of the query is not finite.
   template <Point Query, Collector<Real> C>
   void search(const Query& query, C& collector, Work* work = nullptr) const {
+    detail::check_collector<C, M>();
     if (empty()) return;
     detail::Scratch<Real> row(dimension());
     detail::copy_point<Real>(query, dimension(), row.data(), {"KdTree: query", 0});
@@ -188,6 +196,13 @@ public:
   }
 
 private:
+  /// The caller's ids, one for each of `count` points.
+  static std::span<const PointId> checked(std::span<const PointId> ids, std::size_t count) {
+    CAIRN_EXPECTS(ids.size() == count, "KdTree: there must be one id a point");
+    CAIRN_EXPECTS(!detail::bad_id(ids), "KdTree: an id can be given only once, and no_point is none");
+    return ids;
+  }
+
   KdTree(std::vector<Scalar> rows, std::span<const PointId> ids, std::size_t dim, M metric, unsigned threads)
       : metric_(std::move(metric)), dim_(dim) {
     if (rows.empty()) return;
@@ -235,5 +250,16 @@ private:
   std::size_t dim_ = 0;
   detail::KdParts<Scalar> parts_;
 };
+
+/// Without arguments in <> a tree keeps coordinates as the points have them: doubles stay doubles.
+template <PointSet Points, class M = L2>
+  requires(!std::convertible_to<M, std::span<const PointId>>)
+KdTree(const Points&, M = {}, BuildOptions = {}) -> KdTree<detail::CoordinateOf<Points>, dynamic_dim, M>;
+template <PointSet Points, class M = L2>
+KdTree(const Points&, std::span<const PointId>, M = {}, BuildOptions = {})
+    -> KdTree<detail::CoordinateOf<Points>, dynamic_dim, M>;
+template <PointSet Points, std::convertible_to<std::span<const PointId>> Ids, class M = L2>
+KdTree(const Points&, const Ids&, M = {}, BuildOptions = {})
+    -> KdTree<detail::CoordinateOf<Points>, dynamic_dim, M>;
 
 }  // namespace cairn::inline CAIRN_ABI

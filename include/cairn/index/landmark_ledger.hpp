@@ -20,6 +20,16 @@ namespace cairn::inline CAIRN_ABI {
 
 using LandmarkId = PointId;
 
+namespace detail {
+
+/// Room for one element more, growing as push_back() does.
+template <class T>
+void reserve_one_more(std::vector<T>& elements) {
+  if (elements.size() == elements.capacity()) elements.reserve(2 * elements.size() + 1);
+}
+
+}  // namespace detail
+
 /// When a landmark is to be trusted, and how long it may take to earn that; the thesis's constants.
 struct Probation {
   std::uint32_t base_seen_times = 3;   ///< steps in which it was seen, the first included
@@ -56,8 +66,9 @@ public:
   LandmarkId add() {
     CAIRN_EXPECTS(records_.size() < no_point, "LandmarkLedger: 2^32 - 1 landmarks have been numbered");
     const auto id = static_cast<LandmarkId>(records_.size());
-    on_probation_.push_back(id);
+    detail::reserve_one_more(on_probation_);  // so that nothing fails once the record stands
     records_.push_back({step_, step_, 1, Standing::probation});
+    on_probation_.push_back(id);
     ++probation_size_;
     return id;
   }
@@ -100,27 +111,28 @@ public:
     return found;
   }
 
-  /// Ends the step: promotes and expires.
+  /// Ends the step: promotes and expires. Where memory runs out the step has not ended.
   StepReport advance() {
     StepReport report;
-    ++step_;
-    std::size_t kept = 0;
-    for (const LandmarkId id : on_probation_) {
-      Record& record = records_[id];
-      if (record.standing != Standing::probation) continue;  // erased meanwhile
-      if (record.sightings >= probation_.base_seen_times) {
-        record.standing = Standing::base;
-        --probation_size_;
-        ++base_size_;
-        report.promoted.push_back(id);
-      } else if (step_ - record.first > probation_.max_nonbase_time) {
-        erase(id);
-        report.expired.push_back(id);
-      } else {
-        on_probation_[kept++] = id;
+    for (const LandmarkId id : on_probation_) switch (verdict_on(records_[id])) {
+        case Verdict::promoted:
+          report.promoted.push_back(id);
+          break;
+        case Verdict::expired:
+          report.expired.push_back(id);
+          break;
+        case Verdict::stays:
+        case Verdict::gone:
+          break;
       }
-    }
-    on_probation_.resize(kept);
+    const auto done = [&](LandmarkId id) { return verdict_on(records_[id]) != Verdict::stays; };
+    on_probation_.erase(std::remove_if(on_probation_.begin(), on_probation_.end(), done),
+                        on_probation_.end());
+    for (const LandmarkId id : report.promoted) records_[id].standing = Standing::base;
+    probation_size_ -= report.promoted.size();
+    base_size_ += report.promoted.size();
+    for (const LandmarkId id : report.expired) erase(id);
+    ++step_;
     return report;
   }
 
@@ -132,6 +144,14 @@ private:
     std::uint32_t sightings;
     Standing standing;
   };
+
+  /// What the end of this step makes of a landmark that was on probation.
+  enum class Verdict { promoted, expired, stays, gone };
+  [[nodiscard]] Verdict verdict_on(const Record& record) const noexcept {
+    if (record.standing != Standing::probation) return Verdict::gone;  // erased meanwhile
+    if (record.sightings >= probation_.base_seen_times) return Verdict::promoted;
+    return step_ + 1 - record.first > probation_.max_nonbase_time ? Verdict::expired : Verdict::stays;
+  }
 
   [[nodiscard]] const Record& at(LandmarkId id) const {
     CAIRN_EXPECTS(contains(id), "LandmarkLedger: no such landmark");

@@ -23,8 +23,9 @@
 /// an unlimited budget both give the same matches, up to ties. Landmarks of different classes (bright and
 /// dark blobs) never match.
 ///
-/// The first step's descriptors teach the store their principal axes; everything is kept and searched turned
-/// to those (principal_axes.hpp), which changes no distance and needs about a third of the budget.
+/// The first step's descriptors teach the store their mean and principal axes; everything is kept and
+/// searched turned to those (principal_axes.hpp), which changes distances by no more than rounding and needs
+/// about a third of the budget.
 #pragma once
 
 #include <algorithm>
@@ -116,8 +117,9 @@ public:
     Row row;
     detail::copy_point<float>(descriptor, Dim, row.data(), {"LandmarkStore: landmark", label_.size()});
     trees_[label].reserve_one();
+    detail::reserve_one_more(label_);
+    const LandmarkId id = ledger_.add();  // the last that can fail
     label_.push_back(label);
-    const LandmarkId id = ledger_.add();
     trees_[label].add(id, turned(row));
     return id;
   }
@@ -127,27 +129,30 @@ public:
 
   /// Removes a landmark at once; false where there is none of that id.
   bool erase(LandmarkId id) {
-    const bool base = ledger_.is_base(id);
-    if (!ledger_.erase(id)) return false;
-    trees_[label_[id]].erase(id, base);
-    return true;
+    if (!ledger_.contains(id)) return false;
+    trees_[label_[id]].erase(id, ledger_.is_base(id));
+    return ledger_.erase(id);
   }
 
   /// `twin` turned out to be `kept`: it goes, its sightings and its age are kept's now.
   void merge(LandmarkId kept, LandmarkId twin) {
-    const bool base = ledger_.is_base(twin);
+    CAIRN_EXPECTS(contains(kept) && contains(twin) && kept != twin,
+                  "LandmarkStore::merge: two landmarks of the store are needed");
+    trees_[label_[twin]].erase(twin, ledger_.is_base(twin));
     ledger_.merge(kept, twin);
-    trees_[label_[twin]].erase(twin, base);
   }
 
   /// Removes the landmarks, base ones too, that were not seen for more than `steps` steps; returns them.
+  /// Where memory runs out the others are removed by the next call.
   std::vector<LandmarkId> forget_unseen(std::uint32_t steps) {
     std::vector<LandmarkId> forgotten = ledger_.unseen_for(steps);
     for (const LandmarkId id : forgotten) erase(id);
     return forgotten;
   }
 
-  /// Ends the step: promotes, expires, and makes what was added searchable.
+  /// Ends the step: promotes, expires, and makes what was added searchable. Where memory runs out no landmark
+  /// is lost and matching stays right, but the step may have ended without a report, and what was added in it
+  /// becomes searchable by the next call.
   StepReport advance() {
     if (!axes_ && size() > 0) learn_axes();
     StepReport report = ledger_.advance();
@@ -193,7 +198,7 @@ private:
   Row& turned(Row& row) const noexcept {
     if (!axes_) return row;
     const Row before = row;
-    axes_->turn(before.data(), row.data());
+    axes_->turn_about_mean(before.data(), row.data());
     return row;
   }
 
@@ -206,7 +211,7 @@ private:
       for (std::size_t i = 0; i < trees.rows().size(); i += Dim) {
         Row row;
         std::copy_n(trees.rows().data() + i, Dim, row.data());
-        axes_->turn(row.data(), trees.rows().data() + i);
+        axes_->turn_about_mean(row.data(), trees.rows().data() + i);
       }
   }
 
@@ -232,8 +237,7 @@ private:
     Present present{&ledger_, RatioTestMatch<float>(test, L2{})};
     search.search(trees_[label].list().get(), in_tree.data(), present, budget, work);
     if (!present.best.accepted()) return std::nullopt;
-    return LandmarkMatch{present.best.id(), L2::restore(present.best.first()),
-                         L2::restore(present.best.second())};
+    return LandmarkMatch{present.best.id(), present.best.first(), present.best.second()};
   }
 
   LandmarkLedger ledger_;

@@ -49,16 +49,23 @@ public:
     rows_.insert(rows_.end(), row.begin(), row.end());
   }
 
-  /// Drops those that keep(id) does not want; calls drop(id, row) for each of them.
-  template <class Keep, class Drop>
-  void filter(Keep&& keep, Drop&& drop) {
+  /// Appends those that pick(id) wants.
+  template <class Pick>
+  void copy_if(Pick&& pick, std::vector<LandmarkId>& ids, std::vector<float>& rows) const {
+    for (std::size_t i = 0; i < ids_.size(); ++i)
+      if (pick(ids_[i])) {
+        ids.push_back(ids_[i]);
+        const auto row = rows_.begin() + static_cast<std::ptrdiff_t>(i * Dim);
+        rows.insert(rows.end(), row, row + Dim);
+      }
+  }
+  /// Drops those that keep(id) does not want.
+  template <class Keep>
+  void filter(Keep&& keep) noexcept {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < ids_.size(); ++i) {
+      if (!keep(ids_[i])) continue;
       const auto row = rows_.begin() + static_cast<std::ptrdiff_t>(i * Dim);
-      if (!keep(ids_[i])) {
-        drop(ids_[i], std::span<const float>(row, Dim));
-        continue;
-      }
       if (kept != i) std::copy(row, row + Dim, rows_.begin() + static_cast<std::ptrdiff_t>(kept * Dim));
       ids_[kept++] = ids_[i];
     }
@@ -66,9 +73,19 @@ public:
     rows_.resize(kept * Dim);
   }
 
-  void rebuild() {
-    tree_ = Tree::from_rows(rows_, Dim, ids_);
-    points_moved_ += ids_.size();
+  /// The tree of those that keep(id) wants, for replace().
+  template <class Keep>
+  [[nodiscard]] Tree tree_of(Keep&& keep) const {
+    std::vector<LandmarkId> ids;
+    std::vector<float> rows;
+    ids.reserve(ids_.size());
+    rows.reserve(rows_.size());
+    copy_if(keep, ids, rows);
+    return Tree::from_rows(std::move(rows), Dim, ids);
+  }
+  void replace(Tree tree) noexcept {
+    tree_ = std::move(tree);
+    points_moved_ += tree_.size();
   }
 
   [[nodiscard]] const Tree& tree() const noexcept { return tree_; }
@@ -101,9 +118,9 @@ public:
   void erase(LandmarkId, bool) noexcept {}  // gone from the next rebuild on; until then the store skips it
 
   void settle(const LandmarkLedger& ledger) {
-    all_.filter([&](LandmarkId id) { return ledger.contains(id); },
-                [](LandmarkId, std::span<const float>) {});
-    all_.rebuild();
+    const auto stays = [&](LandmarkId id) { return ledger.contains(id); };
+    all_.replace(all_.tree_of(stays));
+    all_.filter(stays);
   }
 
   /// The trees to search.
@@ -133,23 +150,22 @@ public:
     if (base) base_.erase(id);
   }
 
+  /// What can fail comes first: a landmark that were in both trees would be its own twin.
   void settle(const LandmarkLedger& ledger) {
+    const auto stays = [&](LandmarkId id) { return ledger.contains(id) && !ledger.is_base(id); };
     std::vector<LandmarkId> ids;
     std::vector<float> rows;
-    probation_.filter([&](LandmarkId id) { return ledger.contains(id) && !ledger.is_base(id); },
-                      [&](LandmarkId id, std::span<const float> row) {
-                        if (!ledger.is_base(id)) return;
-                        ids.push_back(id);
-                        rows.insert(rows.end(), row.begin(), row.end());
-                      });
+    probation_.copy_if([&](LandmarkId id) { return ledger.is_base(id); }, ids, rows);
+    Tree tree = probation_.tree_of(stays);
     if (!ids.empty()) base_.insert(Rows<float>(rows, Dim), ids);
-    probation_.rebuild();
+    probation_.replace(std::move(tree));
+    probation_.filter(stays);
   }
 
   /// The trees to search.
   [[nodiscard]] TreeList<Tree> list() const noexcept {
     TreeList<Tree> trees;
-    for (const Tree* tree : base_.trees()) trees.add(*tree);
+    for (const Tree* tree : ForestAccess::trees(base_)) trees.add(*tree);  // the store skips what is gone
     trees.add(probation_.tree());
     return trees;
   }

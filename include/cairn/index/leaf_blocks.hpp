@@ -14,6 +14,7 @@
 #include <span>
 #include <vector>
 
+#include <cairn/core/sizes.hpp>
 #include <cairn/index/block_lanes.hpp>
 #include <cairn/index/kd_layout.hpp>
 #include <cairn/index/neighbors.hpp>
@@ -43,7 +44,9 @@ public:
 
   /// Room for the leaves of a layout, not yet written.
   LeafBlocks(std::size_t dim, const KdLayout& layout)
-      : dim_(dim), coordinates_(layout.leaves() * block_size * dim), ids_(layout.leaves() * block_size) {}
+      : dim_(dim),
+        coordinates_(room_for(layout.leaves() * block_size, dim, "KdTree")),
+        ids_(layout.leaves() * block_size) {}
 
   /// Writes some leaves from the ordered points: points.point(rank) and points.id(rank).
   template <class Points>

@@ -11,9 +11,14 @@
 /// both grow with their argument, accumulating grows with |difference|, and true distances obey the triangle
 /// inequality.
 ///
-/// A metric whose sum is not a sum but a maximum says so: static constexpr bool additive = false. One whose
-/// axes may be circles has period(axis), infinite for a straight axis; one that can be set up wrongly has
-/// check(dimension), which throws. Both are found in axis_metrics.hpp.
+/// A metric whose sum is not a sum but a maximum says so: static constexpr bool additive = false. One of
+/// which reduce(a b) = reduce(a) reduce(b) does not hold says homogeneous = false: it has no ratio test. One
+/// whose axes may be circles has period(axis), infinite for a straight axis; one that can be set up wrongly
+/// has check(dimension), which throws. Both are found in axis_metrics.hpp.
+///
+/// Squares of L2 and Angular are kept in the number type of distances: distances below 1e-19 (1e-154 in
+/// double) lose digits to the range of that type, and below 3e-23 (2e-162) they are 0. Points that are so
+/// near each other in the units of their coordinates need other units.
 ///
 /// accumulate() is a template over the number type so that one line serves single numbers and sixteen lanes
 /// alike: write it with +, *, comparisons and ?:.
@@ -21,10 +26,13 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <concepts>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <type_traits>
 #include <vector>
 
 #include <cairn/version.hpp>
@@ -95,6 +103,8 @@ struct LInfinity {
 /// Angle [rad] between unit vectors; reduced: the squared chord, (2 sin(angle / 2))^2. The points and queries
 /// must have length one: the metric does not normalise them.
 struct Angular {
+  static constexpr bool homogeneous = false;
+
   template <class Number>
   [[gnu::always_inline]] static void accumulate(Number& sum, const Number& difference, std::size_t) noexcept {
     sum = sum + difference * difference;
@@ -120,6 +130,38 @@ template <class M>
 concept HasPeriods = requires(const M& metric, std::size_t axis) {
   { metric.period(axis) } -> std::convertible_to<double>;
 };
+
+/// Whether ratios of distances are ratios of reduced ones, reduced themselves.
+template <class M>
+inline constexpr bool is_homogeneous = !requires { requires !M::homogeneous; };
+
+/// The numbers next to one that is not negative: floating point numbers are ordered as their bits are.
+template <class Real>
+[[nodiscard]] constexpr Real next_above(Real number) noexcept {
+  using Bits = std::conditional_t<sizeof(Real) == 4, std::uint32_t, std::uint64_t>;
+  return std::bit_cast<Real>(std::bit_cast<Bits>(number) + 1);
+}
+template <class Real>
+[[nodiscard]] constexpr Real next_below(Real number) noexcept {
+  using Bits = std::conditional_t<sizeof(Real) == 4, std::uint32_t, std::uint64_t>;
+  return std::bit_cast<Real>(std::bit_cast<Bits>(number) - 1);
+}
+
+/// The largest reduced distance whose true distance is at most `distance` >= 0: what is compared with it is
+/// within, to the last bit of what a search reports. reduce() alone may be a few steps off on either side.
+template <class M, class Real>
+[[nodiscard]] Real largest_reduced(const M& metric, Real distance) noexcept {
+  constexpr Real infinity = std::numeric_limits<Real>::infinity();
+  Real reduced = std::abs(static_cast<Real>(metric.reduce(distance)));  // not -0
+  for (int step = 0; step < 8 && reduced > 0 && metric.restore(reduced) > distance; ++step)
+    reduced = next_below(reduced);
+  for (int step = 0; step < 8 && reduced < infinity; ++step) {
+    const Real next = next_above(reduced);
+    if (!(metric.restore(next) <= distance)) break;
+    reduced = next;
+  }
+  return reduced;
+}
 
 /// Throws Error where the metric cannot serve points of `dim` coordinates.
 template <class M>
@@ -167,7 +209,8 @@ template <class M, class Real>
 }
 
 /// Lower bound of the distance to a cell after its nearest side on one axis moved from `old` to `offset`
-/// away from the query (both as differences, |offset| >= |old|).
+/// away from the query (both as differences, |offset| >= |old|). Lowered by more than the sum is rounded: a
+/// point at a corner of its cell may be as near as the cell, and its distance is rounded in another order.
 template <class M, class Real>
 [[nodiscard]] Real moved_bound(const M& metric, Real bound, Real old, Real offset,
                                std::size_t axis) noexcept {
@@ -178,7 +221,7 @@ template <class M, class Real>
   } else {
     Real before = 0;
     metric.accumulate(before, old, axis);
-    return bound + (after - before);
+    return (bound + (after - before)) * (1 - 4 * std::numeric_limits<Real>::epsilon());
   }
 }
 

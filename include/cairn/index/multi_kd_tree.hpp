@@ -13,6 +13,13 @@
 /// points are marked, and dropped at the next merge, or when half of all are dead. The binary counter is to
 /// be had as well, and merging that takes no step long (multi_tree_shape.hpp).
 ///
+///   MultiKdTree<float, 3> map;
+///   const PointId first = map.insert(points);           // numbered first, first + 1, ...
+///   map.erase(first);                                   // found by nothing from here on
+///   BestBinFirst<MultiKdTree<float, 3>> search;         // under a budget; keep one for many searches
+///   search.search(map, query, collector, {.leaves = 24});
+///   for (PointId id : inside(map, low, high)) ...       // and NearestFirst order(map, query)
+///
 /// Const methods may run at the same time, on any threads, also while a merge is under way in the background;
 /// not during a call of insert, erase, rebuild or finish_merges. To go on answering during those, answer from
 /// a copy: copies share the trees, so making one takes a byte a point.
@@ -24,10 +31,12 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/index/forest_queries.hpp>
 #include <cairn/index/forest_search.hpp>
 #include <cairn/index/kd_tree.hpp>
 #include <cairn/index/multi_tree_shape.hpp>
@@ -35,10 +44,20 @@
 
 namespace cairn::inline CAIRN_ABI {
 
-/// Arguments as KdTree. Ids stay valid until erased, and are never given twice.
+namespace detail {
+
+/// What stands for the coordinates where nobody said their type.
+struct Unsaid {};
+
+}  // namespace detail
+
+/// Arguments as KdTree. Ids stay valid until erased, and are never given twice. What is erased is found by no
+/// search from then on.
 template <class Scalar = float, std::size_t Dim = dynamic_dim, class M = L2>
 class MultiKdTree {
 public:
+  static_assert(!std::is_same_v<Scalar, detail::Unsaid>,
+                "say what coordinates are kept as: MultiKdTree<float> or MultiKdTree<double>");
   using Tree = KdTree<Scalar, Dim, M>;
   using Real = typename Tree::Real;
   using Hit = typename Tree::Hit;
@@ -55,8 +74,14 @@ public:
   [[nodiscard]] std::size_t dimension() const noexcept { return Dim != dynamic_dim ? Dim : dim_; }
   [[nodiscard]] const M& metric() const noexcept { return metric_; }
   [[nodiscard]] const MultiTreeShape& shape() const noexcept { return forest_.shape(); }
-  /// The trees, smallest first, none empty; those that are being merged stand for the result.
-  [[nodiscard]] std::span<const Tree* const> trees() const noexcept { return forest_.trees(); }
+  /// How many points each tree holds, smallest first, none of them 0; trees that are being merged stand for
+  /// the result, and erased points count until a merge drops them.
+  [[nodiscard]] std::vector<std::size_t> tree_sizes() const {
+    std::vector<std::size_t> sizes;
+    for (const Tree* tree : forest_.trees()) sizes.push_back(tree->size());
+    return sizes;
+  }
+  [[nodiscard]] std::size_t tree_count() const noexcept { return forest_.trees().size(); }
   /// Merges that were started and whose result is not yet in use.
   [[nodiscard]] std::size_t merges_under_way() const noexcept { return forest_.merges_under_way(); }
   /// Points written into trees so far, by insertions and merges: the work of updating.
@@ -67,12 +92,12 @@ public:
   /// Memory held, the points included, without that of merges under way.
   [[nodiscard]] std::size_t bytes() const noexcept {
     std::size_t bytes = state_.capacity();
-    for (const Tree* tree : trees()) bytes += tree->bytes();
+    for (const Tree* tree : forest_.trees()) bytes += tree->bytes();
     return bytes;
   }
 
-  /// Adds points under new consecutive ids; returns the first. Throws as KdTree does, leaving the index as it
-  /// was.
+  /// Adds points under new consecutive ids, the first of which it returns: one more than any id so far.
+  /// Throws as KdTree does, leaving the index as it was.
   template <PointSet Points>
   PointId insert(const Points& points) {
     const auto count = static_cast<std::size_t>(points.size());
@@ -86,7 +111,9 @@ public:
     return first;
   }
 
-  /// Adds points under the caller's ids. An id must not have been used before (also not erased).
+  /// Adds points under the caller's ids, each of them new: not given before (also if erased since), not twice
+  /// here, not no_point. A byte is kept for every number up to the largest id. Whatever is thrown, by a
+  /// violation handler too, leaves the index as it was.
   template <PointSet Points>
   void insert(const Points& points, std::span<const PointId> ids) {
     CAIRN_EXPECTS(ids.size() == points.size(), "MultiKdTree::insert: there must be one id a point");
@@ -94,6 +121,7 @@ public:
     const std::size_t dim = dimension() != 0 ? dimension() : detail::dimension_of<Dim>(points);
     std::vector<Scalar> rows = detail::copy_points<Scalar>(points, dim, "MultiKdTree: point");
     Entering marks(state_, ids);
+    marks.set();
     const std::uint64_t now = updates_ + ids.size();
     forest_.advance(now);
     forest_.add({std::move(rows), {ids.begin(), ids.end()}}, {dim, metric_, state_, live_, now});
@@ -147,7 +175,7 @@ public:
   [[nodiscard]] std::vector<Hit> within(const Query& query, Real radius) const {
     CAIRN_EXPECTS(radius >= 0, "MultiKdTree::within: a radius is not negative");
     std::vector<Hit> found;
-    Within<Real> collector(found, metric_.reduce(radius));
+    Within<Real> collector(found, detail::largest_reduced(metric_, radius));
     search(query, collector);
     for (Hit& hit : found) hit.distance = metric_.restore(hit.distance);
     std::sort(found.begin(), found.end(), nearer<Real>);
@@ -157,59 +185,65 @@ public:
   /// Exact search through all trees, the largest first, with one collector and so one bound.
   template <Point Query, Collector<Real> C>
   void search(const Query& query, C& collector, Work* work = nullptr) const {
+    detail::check_collector<C, M>();
     if (live_ == forest_.stored()) return search_trees(query, collector, work);
-    OnlyLive<C> only_live{&state_, &collector};
+    detail::OnlyLive<Real, C> only_live{&state_, &collector};
     search_trees(query, only_live, work);
+  }
+
+  /// Calls visit(id, std::span<const Scalar>) for every point that is not erased, tree by tree.
+  template <class Visit>
+  void for_each(Visit&& visit) const {
+    for (const Tree* tree : forest_.trees())
+      tree->for_each([&](PointId id, std::span<const Scalar> row) {
+        if (contains(id)) visit(id, row);
+      });
   }
 
 private:
   using PointState = detail::PointState;
   static_assert(sizeof(PointState) == 1);
-
-  /// Passes on what is not erased.
-  template <class C>
-  struct OnlyLive {
-    const std::vector<PointState>* state;
-    C* collector;
-    [[nodiscard]] Real limit() const { return static_cast<Real>(collector->limit()); }
-    void offer(PointId id, Real reduced) {
-      if ((*state)[id] == PointState::live) collector->offer(id, reduced);
-    }
-  };
+  friend struct detail::ForestAccess;
 
   template <Point Query, class C>
   void search_trees(const Query& query, C& collector, Work* work) const {
-    if (trees().empty()) return;
+    const std::span<const Tree* const> trees = forest_.trees();
+    if (trees.empty()) return;
     detail::Scratch<Real> row(dimension());
     detail::copy_point<Real>(query, dimension(), row.data(), {"MultiKdTree: query", 0});
     detail::wrap_row(metric_, dimension(), row.data());
     Work done;
     if (dimension() <= detail::few_axes)
-      detail::search_in_step(trees(), row.data(), collector, done);
+      detail::search_in_step(trees, row.data(), collector, done);
     else
-      for (std::size_t i = trees().size(); i-- > 0;)
-        trees()[i]->search(std::span<const Real>(row.data(), dimension()), collector, &done);
+      for (std::size_t i = trees.size(); i-- > 0;)
+        trees[i]->search(std::span<const Real>(row.data(), dimension()), collector, &done);
     if (work != nullptr) *work += done;
   }
 
-  /// Marks the ids of an insertion; takes the marks back unless the insertion went through.
+  /// Marks the ids of an insertion; takes the marks back unless the insertion went through. The checks stand
+  /// in a call of their own: where a violation handler throws, the marks set so far must have an owner.
   class Entering {
   public:
-    Entering(std::vector<PointState>& state, std::span<const PointId> ids)
-        : state_(state), ids_(ids), old_size_(state.size()) {
-      const PointId last = *std::max_element(ids.begin(), ids.end());
-      CAIRN_EXPECTS(last != no_point, "MultiKdTree::insert: no_point is not an id");
-      if (last >= state.size()) state.resize(std::size_t{last} + 1, PointState::unknown);
-      for (const PointId id : ids) {
-        CAIRN_EXPECTS(state[id] == PointState::unknown, "MultiKdTree::insert: an id can be given only once");
-        state[id] = PointState::entering;
-      }
-    }
+    Entering(std::vector<PointState>& state, std::span<const PointId> ids) noexcept
+        : state_(state), ids_(ids), old_size_(state.size()) {}
     Entering(const Entering&) = delete;
     Entering& operator=(const Entering&) = delete;
     ~Entering() {
-      for (const PointId id : ids_) state_[id] = committed_ ? PointState::live : PointState::unknown;
+      for (const PointId id : ids_.first(marked_))
+        state_[id] = committed_ ? PointState::live : PointState::unknown;
       if (!committed_) state_.resize(old_size_);  // so that the next insertion gets the same ids
+    }
+
+    void set() {
+      const PointId last = *std::max_element(ids_.begin(), ids_.end());
+      CAIRN_EXPECTS(last != no_point, "MultiKdTree::insert: no_point is not an id");
+      if (last >= state_.size()) state_.resize(std::size_t{last} + 1, PointState::unknown);
+      for (const PointId id : ids_) {
+        CAIRN_EXPECTS(state_[id] == PointState::unknown, "MultiKdTree::insert: an id can be given only once");
+        state_[id] = PointState::entering;
+        ++marked_;
+      }
     }
     void commit() noexcept { committed_ = true; }
 
@@ -217,6 +251,7 @@ private:
     std::vector<PointState>& state_;
     std::span<const PointId> ids_;
     std::size_t old_size_;
+    std::size_t marked_ = 0;
     bool committed_ = false;
   };
 
@@ -239,5 +274,8 @@ private:
   std::size_t live_ = 0;
   std::uint64_t updates_ = 0;  ///< points inserted and erased so far
 };
+
+/// Coordinates that nobody named would be rounded to some type's.
+MultiKdTree(MultiTreeShape = {}) -> MultiKdTree<detail::Unsaid>;
 
 }  // namespace cairn::inline CAIRN_ABI

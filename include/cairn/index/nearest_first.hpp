@@ -40,6 +40,8 @@ public:
     detail::wrap_row(tree.metric(), query_.size(), query_.data());
     cells_.push_back({0, 0, 0, {}});
   }
+  template <Point Query>
+  NearestFirst(const Tree&&, const Query&) = delete;  ///< would be gone
 
   /// The next nearest point, with its true distance; nothing when all have been given.
   std::optional<Hit> next() {

@@ -5,8 +5,10 @@
 /// What a search finds, and the collectors that decide what is kept: the one extension point of every search.
 ///
 /// A search calls limit() and skips whatever is not nearer than that, and calls offer(id, reduced) for each
-/// point that is. limit() never grows during a search. Reduced distances are the metric's (squared for L2);
-/// Neighbor always holds a true distance. Gates, ratio tests and counters are collectors of one's own.
+/// point that is. limit() never grows during a search. Reduced distances are the metric's (squared for L2)
+/// and called so wherever they are shown; Neighbor and all else hold true ones. A collector that restores
+/// distances by itself names their metric, Measure, and no search of another metric takes it. Gates, ratio
+/// tests and counters are collectors of one's own.
 #pragma once
 
 #include <cmath>
@@ -14,8 +16,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
+#include <cairn/index/metric.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn::inline CAIRN_ABI {
@@ -38,6 +42,24 @@ concept Collector = requires(C& collector, const C& fixed, PointId id, Real redu
   { fixed.limit() } -> std::convertible_to<Real>;
   collector.offer(id, reduced);
 };
+
+namespace detail {
+
+/// Whether a collector may be shown distances of the metric M: it must not take them for those of another.
+template <class C, class M>
+inline constexpr bool suits_metric = true;
+template <class C, class M>
+  requires requires { typename C::Measure; }
+inline constexpr bool suits_metric<C, M> = std::derived_from<M, typename C::Measure>;
+
+template <class C, class M>
+constexpr void check_collector() noexcept {
+  static_assert(suits_metric<C, M>,
+                "the collector restores distances of another metric than the search's: name it in the "
+                "collector's type, as in NearestTwo<float, L1>");
+}
+
+}  // namespace detail
 
 /// What a search did. Deterministic, so tests and benchmarks compare it where times are noise.
 struct Work {
@@ -75,11 +97,15 @@ private:
   Real reduced_;
 };
 
-/// Keeps the nearest and the second nearest: what a ratio test needs.
-template <class Real>
+/// Keeps the nearest and the second nearest: what a ratio test needs. `M` is the metric of the search.
+template <class Real, class M = L2>
 class NearestTwo {
 public:
-  /// The first must be nearer than `limit` (reduced); the second may be anywhere.
+  using Measure = M;
+
+  NearestTwo() = default;
+  explicit NearestTwo(M metric) noexcept : metric_(std::move(metric)) {}
+
   [[nodiscard]] Real limit() const noexcept { return second_; }
   void offer(PointId id, Real reduced) noexcept {
     if (reduced < first_) {
@@ -94,14 +120,24 @@ public:
   }
   [[nodiscard]] PointId id() const noexcept { return id_; }
   [[nodiscard]] PointId second_id() const noexcept { return second_id_; }
-  [[nodiscard]] Real first() const noexcept { return first_; }
-  [[nodiscard]] Real second() const noexcept { return second_; }  ///< infinity where there is only one point
+  /// Their true distances; infinity where there is no such point.
+  [[nodiscard]] Real first() const noexcept { return restored(first_); }
+  [[nodiscard]] Real second() const noexcept { return restored(second_); }
+  [[nodiscard]] Real first_reduced() const noexcept { return first_; }
+  [[nodiscard]] Real second_reduced() const noexcept { return second_; }
 
 private:
+  static constexpr Real infinity = std::numeric_limits<Real>::infinity();
+
+  [[nodiscard]] Real restored(Real reduced) const noexcept {
+    return reduced < infinity ? static_cast<Real>(metric_.restore(reduced)) : infinity;
+  }
+
+  [[no_unique_address]] M metric_{};
   PointId id_ = no_point;
   PointId second_id_ = no_point;
-  Real first_ = std::numeric_limits<Real>::infinity();
-  Real second_ = std::numeric_limits<Real>::infinity();
+  Real first_ = infinity;
+  Real second_ = infinity;
 };
 
 /// Keeps the k nearest in the caller's memory, sorted; `found` must hold at least k. Allocates nothing.

@@ -5,14 +5,21 @@
 /// What may be put into an index: anything with size() and [i] that gives something with [axis].
 ///
 /// std::vector<std::array<float, 3>>, C arrays, std::vector<Eigen::Vector3d>, spans and foreign point types
-/// with operator[] all qualify as they are. Rows views flat memory as points, so also the columns of an Eigen
-/// matrix; Through views points that have no operator[]. None of them copies.
+/// with operator[] all qualify as they are. Rows views flat memory as points, one after the other; rows_of()
+/// and columns_of() view a matrix, Strided any memory with even steps, Through points that have no
+/// operator[]. None of them copies, so what they view must outlive them.
+///
+/// An index keeps coordinates as float, as double, or as whole numbers of up to four bytes, and rounds what
+/// it is given to the nearest float or double; a whole number must be given as one. A query is never rounded
+/// to the coordinate type, only to that of distances (float for float and for whole numbers of up to two
+/// bytes, otherwise double): among bytes a query may be 300.7 or -5.
 #pragma once
 
 #include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <string>
 #include <type_traits>
@@ -20,6 +27,7 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/sizes.hpp>
 
 namespace cairn::inline CAIRN_ABI {
 
@@ -40,7 +48,33 @@ concept PointSet = requires(const S& set, std::size_t i) {
   requires Point<std::remove_cvref_t<decltype(set[i])>>;
 };
 
-/// Flat memory seen as points: `dim` numbers each, one after the other.
+namespace detail {
+
+/// A matrix in memory: an Eigen matrix, map, block or transpose, or whatever else has these members.
+template <class Matrix>
+concept MatrixInMemory = requires(const Matrix& matrix) {
+  { *matrix.data() } -> std::convertible_to<double>;
+  { matrix.rows() } -> std::convertible_to<std::ptrdiff_t>;
+  { matrix.cols() } -> std::convertible_to<std::ptrdiff_t>;
+  { matrix.rowStride() } -> std::convertible_to<std::ptrdiff_t>;
+  { matrix.colStride() } -> std::convertible_to<std::ptrdiff_t>;
+};
+
+/// Whether the numbers go when it goes: Eigen's maps, blocks and transposes hold somebody else's.
+template <class Matrix>
+inline constexpr bool owns_memory = true;
+template <class Matrix>
+  requires requires { typename Matrix::PlainObject; }
+inline constexpr bool owns_memory<Matrix> = std::is_same_v<Matrix, typename Matrix::PlainObject>;
+
+template <class Matrix>
+concept MatrixThatStays = MatrixInMemory<std::remove_cvref_t<Matrix>> &&
+                          (std::is_lvalue_reference_v<Matrix> || !owns_memory<std::remove_cvref_t<Matrix>>);
+
+}  // namespace detail
+
+/// Flat memory seen as points: `dim` numbers each, one after the other. The rows or the columns of a matrix
+/// lie so in one of its two layouts only: rows_of() and columns_of() see them in both.
 template <class Scalar>
 class Rows {
 public:
@@ -51,6 +85,11 @@ public:
       raise("Rows: " + std::to_string(numbers.size()) + " numbers are not a whole number of points of " +
             std::to_string(dim));
   }
+  template <detail::MatrixInMemory Matrix>
+  Rows(const Matrix&,
+       std::size_t) = delete;  ///< rows_of(matrix) or columns_of(matrix) says which are the points
+  template <detail::MatrixInMemory Matrix>
+  explicit Rows(const Matrix&) = delete;  ///< the same
 
   [[nodiscard]] std::size_t size() const noexcept { return numbers_.size() / dim_; }
   [[nodiscard]] std::size_t dimension() const noexcept { return dim_; }
@@ -63,6 +102,69 @@ private:
   std::size_t dim_;
 };
 
+/// Memory seen as points that lie at even steps: coordinate a of point i is first[i point_step + a
+/// axis_step].
+template <class Scalar>
+class Strided {
+public:
+  /// One point.
+  class View {
+  public:
+    using size_type = std::size_t;
+    [[nodiscard]] std::size_t size() const noexcept { return dim_; }
+    [[nodiscard]] const Scalar& operator[](std::size_t axis) const noexcept {
+      return first_[static_cast<std::ptrdiff_t>(axis) * step_];
+    }
+
+  private:
+    friend class Strided;
+    View(const Scalar* first, std::size_t dim, std::ptrdiff_t step) : first_(first), dim_(dim), step_(step) {}
+    const Scalar* first_;
+    std::size_t dim_;
+    std::ptrdiff_t step_;
+  };
+
+  /// `count` points of `dim` numbers; steps are counted in numbers and may be negative. Throws Error for
+  /// dimension 0.
+  Strided(const Scalar* first, std::size_t count, std::size_t dim, std::ptrdiff_t point_step,
+          std::ptrdiff_t axis_step)
+      : first_(first), count_(count), dim_(dim), point_step_(point_step), axis_step_(axis_step) {
+    if (dim == 0) raise("Strided: a point needs at least one coordinate, got dimension 0");
+  }
+
+  [[nodiscard]] std::size_t size() const noexcept { return count_; }
+  [[nodiscard]] std::size_t dimension() const noexcept { return dim_; }
+  [[nodiscard]] View operator[](std::size_t i) const noexcept {
+    return View(first_ + static_cast<std::ptrdiff_t>(i) * point_step_, dim_, axis_step_);
+  }
+
+private:
+  const Scalar* first_;
+  std::size_t count_;
+  std::size_t dim_;
+  std::ptrdiff_t point_step_;
+  std::ptrdiff_t axis_step_;
+};
+
+/// The rows of a matrix as points, whichever way it lies in memory: an N x 3 Eigen matrix is N points of
+/// three numbers. Refers to the numbers of the matrix; a temporary that owns them is refused. Throws Error
+/// where it has no columns.
+template <detail::MatrixThatStays Matrix>
+[[nodiscard]] auto rows_of(Matrix&& matrix) {
+  return Strided(matrix.data(), static_cast<std::size_t>(matrix.rows()),
+                 static_cast<std::size_t>(matrix.cols()), std::ptrdiff_t{matrix.rowStride()},
+                 std::ptrdiff_t{matrix.colStride()});
+}
+
+/// The columns of a matrix as points: a 3 x N Eigen matrix is N points of three numbers. Otherwise as
+/// rows_of().
+template <detail::MatrixThatStays Matrix>
+[[nodiscard]] auto columns_of(Matrix&& matrix) {
+  return Strided(matrix.data(), static_cast<std::size_t>(matrix.cols()),
+                 static_cast<std::size_t>(matrix.rows()), std::ptrdiff_t{matrix.colStride()},
+                 std::ptrdiff_t{matrix.rowStride()});
+}
+
 /// A set of points seen through a function that gives their coordinates:
 ///
 /// ```cpp
@@ -72,7 +174,7 @@ private:
 /// const cairn::Through points(cloud, 3, coordinate);
 /// ```
 ///
-/// Refers to the set, which must live as long.
+/// Refers to the set, which must live as long: a temporary is refused.
 template <class Set, class Coordinate>
 class Through {
 public:
@@ -96,10 +198,12 @@ public:
       : set_(&set), dim_(dim), coordinate_(std::move(coordinate)) {
     if (dim == 0) raise("Through: a point needs at least one coordinate, got dimension 0");
   }
+  Through(const Set&&, std::size_t, Coordinate) = delete;  ///< would be gone
 
   [[nodiscard]] std::size_t size() const noexcept { return static_cast<std::size_t>(set_->size()); }
   [[nodiscard]] std::size_t dimension() const noexcept { return dim_; }
-  [[nodiscard]] View operator[](std::size_t i) const { return View(set_, i, &coordinate_); }
+  [[nodiscard]] View operator[](std::size_t i) const& { return View(set_, i, &coordinate_); }
+  View operator[](std::size_t) const&& = delete;  ///< the view would refer to what is gone
 
 private:
   const Set* set_;
@@ -109,15 +213,51 @@ private:
 
 namespace detail {
 
-/// Coordinates of any Point type; the index type is chosen so that no container warns.
-template <class Scalar, Point P>
-[[gnu::always_inline]] inline Scalar coordinate(const P& point, std::size_t axis) {
+/// What stands at an axis of any Point type; the index type is chosen so that no container warns.
+template <Point P>
+[[gnu::always_inline]] inline auto number_at(const P& point, std::size_t axis) {
   if constexpr (requires { requires std::unsigned_integral<typename P::size_type>; })
-    return static_cast<Scalar>(point[static_cast<typename P::size_type>(axis)]);
+    return point[static_cast<typename P::size_type>(axis)];
   else if constexpr (std::is_pointer_v<P> || std::is_array_v<P>)
-    return static_cast<Scalar>(point[axis]);
+    return point[axis];
   else
-    return static_cast<Scalar>(point[static_cast<int>(axis)]);
+    return point[static_cast<int>(axis)];
+}
+
+/// The same as a Scalar.
+template <std::floating_point Scalar, Point P>
+[[gnu::always_inline]] inline Scalar coordinate(const P& point, std::size_t axis) {
+  return static_cast<Scalar>(number_at(point, axis));
+}
+
+/// The types that an index can keep coordinates in.
+template <class Scalar>
+inline constexpr bool is_coordinate =
+    std::is_same_v<Scalar, float> || std::is_same_v<Scalar, double> ||
+    (std::is_integral_v<Scalar> && !std::is_same_v<Scalar, bool> && sizeof(Scalar) <= 4);
+
+/// The one that holds what a set's points give: theirs, or double where none is as wide.
+template <class Number>
+using CoordinateFor = std::conditional_t<is_coordinate<Number>, Number, double>;
+template <PointSet Points>
+using CoordinateOf =
+    CoordinateFor<std::remove_cvref_t<decltype(number_at(std::declval<const Points&>()[0], 0))>>;
+
+/// Whether a number of any type is one of those of a Scalar.
+template <std::integral Scalar, class Number>
+[[nodiscard]] constexpr bool is_whole(const Number& number) noexcept {
+  constexpr Scalar lowest = std::numeric_limits<Scalar>::min();
+  constexpr Scalar highest = std::numeric_limits<Scalar>::max();
+  if constexpr (std::is_unsigned_v<Number>) {
+    return number <= static_cast<std::make_unsigned_t<Scalar>>(highest);
+  } else if constexpr (std::is_integral_v<Number>) {
+    return static_cast<long long>(number) >= static_cast<long long>(lowest) &&
+           static_cast<long long>(number) <= static_cast<long long>(highest);
+  } else {
+    const auto real =
+        static_cast<std::conditional_t<std::is_same_v<Number, long double>, Number, double>>(number);
+    return real >= lowest && real <= highest && real == static_cast<Scalar>(real);  // false for NaN
+  }
 }
 
 /// Number of coordinates of a point that knows it; `otherwise` for pointers and such.
@@ -144,26 +284,58 @@ struct PointPlace {
   std::size_t index;
 };
 
+/// What a coordinate must be, for the message of a refusal.
+template <class Scalar>
+[[nodiscard]] std::string usable_coordinates() {
+  if constexpr (std::integral<Scalar>)
+    return "a whole number from " + std::to_string(std::numeric_limits<Scalar>::min()) + " to " +
+           std::to_string(std::numeric_limits<Scalar>::max());
+  else
+    return "a finite number whose squared differences stay finite";
+}
+
+/// The number as a Scalar; `usable` becomes false where it cannot be one.
+template <class Scalar, class Number>
+[[gnu::always_inline]] inline Scalar to_coordinate(const Number& number, bool& usable) {
+  if constexpr (std::floating_point<Scalar>) {
+    const auto kept = static_cast<Scalar>(number);
+    usable &= std::abs(kept) <= largest_coordinate<Scalar>();  // false for NaN
+    return kept;
+  } else {
+    const bool whole = is_whole<Scalar>(number);
+    usable &= whole;
+    return whole ? static_cast<Scalar>(number) : Scalar{};
+  }
+}
+
 /// Copies the coordinates of `point` to `row`; throws Error, naming point and axis, where one is not a finite
-/// number of usable size or the count is not `dim`.
+/// number of usable size (for whole Scalars: not one of theirs) or the count is not `dim`.
 template <class Scalar, Point P>
 void copy_point(const P& point, std::size_t dim, Scalar* row, const PointPlace& entry) {
   const auto where = [&] { return std::string(entry.what) + " " + std::to_string(entry.index); };
   if (const std::size_t size = size_of_point(point, dim); size != dim) [[unlikely]]
     raise(where() + " has " + std::to_string(size) + " coordinates, expected " + std::to_string(dim));
   bool usable = true;
-  for (std::size_t axis = 0; axis < dim; ++axis) {
-    row[axis] = coordinate<Scalar>(point, axis);
-    if constexpr (std::floating_point<Scalar>)
-      usable &= std::abs(row[axis]) <= largest_coordinate<Scalar>();  // false for NaN
-  }
+  for (std::size_t axis = 0; axis < dim; ++axis)
+    row[axis] = to_coordinate<Scalar>(number_at(point, axis), usable);
   if (usable) [[likely]]
     return;
-  for (std::size_t axis = 0; axis < dim; ++axis)
-    if (!(std::abs(static_cast<double>(row[axis])) <= static_cast<double>(largest_coordinate<Scalar>())))
+  for (std::size_t axis = 0; axis < dim; ++axis) {
+    bool good = true;
+    static_cast<void>(to_coordinate<Scalar>(number_at(point, axis), good));
+    if (!good)
       raise(where() + ", coordinate " + std::to_string(axis) + " is " +
-            std::to_string(static_cast<double>(row[axis])) +
-            ", expected a finite number whose squared differences stay finite");
+            std::to_string(static_cast<double>(number_at(point, axis))) + ", expected " +
+            usable_coordinates<Scalar>());
+  }
+}
+
+/// Throws Error, naming point and axis, where a number among rows of `dim` is none that a point may have.
+template <class Scalar>
+void check_rows(const std::vector<Scalar>& rows, std::size_t dim, const char* what) {
+  std::vector<Scalar> row(dim);
+  for (std::size_t i = 0; i < rows.size() / dim; ++i)
+    copy_point(std::span<const Scalar>(rows.data() + i * dim, dim), dim, row.data(), PointPlace{what, i});
 }
 
 /// Dimension of a point set: Dim where fixed, otherwise the size of its first point.
@@ -186,7 +358,7 @@ template <class Scalar, PointSet Points>
   const auto count = static_cast<std::size_t>(points.size());
   check_count(count, what);
   if (count > 0 && dim == 0) raise(std::string(what) + ": a point needs at least one coordinate");
-  std::vector<Scalar> rows(count * dim);
+  std::vector<Scalar> rows(room_for(count, dim, what));
   for (std::size_t i = 0; i < count; ++i)
     copy_point<Scalar>(points[i], dim, rows.data() + i * dim, PointPlace{what, i});
   return rows;

@@ -6,17 +6,20 @@
 ///
 /// A rotation changes no Euclidean distance, so trees of turned points answer as before. But splits along the
 /// axes of largest variance separate better, and a distance that is summed from the first coordinate on is
-/// known to be too large after a few of them. The eigenvectors of the covariance are found by Jacobi's method
-/// (cyclic, Golub and Van Loan, "Matrix Computations", 4th ed., section 8.5).
+/// known to be too large after a few of them. Turned coordinates are rounded in proportion to the length of
+/// what was turned: points far from the origin are turned about the mean. The eigenvectors of the covariance
+/// are found by Jacobi's method (cyclic, Golub and Van Loan, "Matrix Computations", 4th ed., section 8.5).
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <numeric>
+#include <span>
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/sizes.hpp>
 #include <cairn/index/block_lanes.hpp>
 #include <cairn/index/points.hpp>
 
@@ -32,7 +35,8 @@ public:
     const std::size_t count = points.size();
     CAIRN_EXPECTS(count > 0 && sample > 0, "PrincipalAxes: there is nothing to learn from");
     dim_ = detail::dimension_of<dynamic_dim>(points);
-    const std::size_t step = (count + sample - 1) / sample;
+    if (dim_ == 0) raise("PrincipalAxes: a point needs at least one coordinate");
+    const std::size_t step = count / sample + (count % sample != 0);
     std::vector<double> rows;
     std::vector<double> row(dim_);
     for (std::size_t i = 0; i < count; i += step) {
@@ -43,25 +47,39 @@ public:
   }
 
   [[nodiscard]] std::size_t dimension() const noexcept { return dim_; }
+  /// Of the points that were looked at.
+  [[nodiscard]] std::span<const float> mean() const noexcept { return mean_; }
 
   /// Writes the turned coordinates of `point` (dim numbers) to `turned`; the two must not overlap. O(dim^2).
   void turn(const float* point, float* turned) const noexcept {
+    turn_by(turned, [point](std::size_t a) CAIRN_INLINED { return point[a]; });
+  }
+  /// The same of the point less mean(): differences and distances are those of turn(), with less rounding.
+  void turn_about_mean(const float* point, float* turned) const noexcept {
+    const float* mean = mean_.data();
+    turn_by(turned, [point, mean](std::size_t a) CAIRN_INLINED { return point[a] - mean[a]; });
+  }
+
+private:
+  template <class NumberAt>
+  void turn_by(float* turned, const NumberAt& number_at) const noexcept {
     detail::with_widest_lanes([&]() CAIRN_INLINED {
       for (std::size_t i = 0; i < dim_; ++i) turned[i] = 0;
       for (std::size_t a = 0; a < dim_; ++a) {
-        const float number = point[a];
+        const float number = number_at(a);
         const float* column = columns_.data() + a * dim_;
         for (std::size_t i = 0; i < dim_; ++i) turned[i] += number * column[i];
       }
     });
   }
 
-private:
-  [[nodiscard]] std::vector<double> covariance(std::vector<double>& rows) const {
+  [[nodiscard]] std::vector<double> covariance(std::vector<double>& rows) {
     const std::size_t count = rows.size() / dim_;
     std::vector<double> mean(dim_, 0.0);
     for (std::size_t i = 0; i < rows.size(); ++i) mean[i % dim_] += rows[i] / static_cast<double>(count);
-    std::vector<double> sums(dim_ * dim_, 0.0);
+    constexpr double most = detail::largest_coordinate<float>();
+    for (const double number : mean) mean_.push_back(static_cast<float>(std::clamp(number, -most, most)));
+    std::vector<double> sums(detail::room_for(dim_, dim_, "PrincipalAxes"), 0.0);
     for (std::size_t r = 0; r < count; ++r) {
       double* row = rows.data() + r * dim_;
       for (std::size_t a = 0; a < dim_; ++a) row[a] -= mean[a];
@@ -121,6 +139,7 @@ private:
   }
 
   std::size_t dim_ = 0;
+  std::vector<float> mean_;
   std::vector<float> columns_;
 };
 

@@ -16,12 +16,18 @@
 /// so that a point that one tree hides behind a split is in front in another. Each tree holds all points:
 /// memory and build grow with their number, a search's work does not. Where it pays, and where it does not:
 /// docs/index.md.
+///
+/// Turned coordinates are rounded, which moves a point by up to a known length. Therefore points are turned
+/// about their mean, trees are searched that much farther than the collector's limit, and whoever is met
+/// there is measured by the coordinates given, as BruteForce does. The rounding of a rotation is bounded in
+/// Higham, "Accuracy and stability of numerical algorithms", 2nd ed., section 3.5.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -54,10 +60,13 @@ public:
     CAIRN_EXPECTS(options.trees >= 1, "RotatedForest: there must be a tree");
     if (points.size() == 0) return;
     const std::size_t dim = detail::dimension_of<Dim>(points);
-    const auto rows = detail::copy_points<float>(points, dim, "RotatedForest: point");
-    axes_.emplace_back(Rows<float>(rows, dim));
-    std::vector<float> turned(rows.size());
-    for (std::size_t i = 0; i < rows.size(); i += dim) axes_.front().turn(&rows[i], &turned[i]);
+    rows_ = detail::copy_points<float>(points, dim, "RotatedForest: point");
+    axes_.emplace_back(Rows<float>(rows_, dim));
+    std::vector<float> turned(rows_.size());
+    for (std::size_t i = 0; i < rows_.size(); i += dim) {
+      axes_.front().turn_about_mean(&rows_[i], &turned[i]);
+      radius_ = std::max(radius_, distance_from_mean(&rows_[i]));
+    }
     mixed_ = std::min(options.turned_axes, dim);
     Random random(options.seed);
     std::vector<float> mixed_rows;
@@ -78,7 +87,7 @@ public:
   [[nodiscard]] std::size_t dimension() const noexcept { return empty() ? Dim : trees_.front().dimension(); }
   [[nodiscard]] std::span<const Tree> trees() const noexcept { return trees_; }
   [[nodiscard]] std::size_t bytes() const noexcept {
-    std::size_t sum = 0;
+    std::size_t sum = rows_.capacity() * sizeof(float);
     for (const Tree& tree : trees_) sum += tree.bytes();
     return sum;
   }
@@ -86,14 +95,40 @@ public:
   /// Writes the query (dimension() numbers) as each tree sees it, one after the other.
   void turn(const float* query, float* turned) const noexcept {
     const std::size_t dim = dimension();
-    axes_.front().turn(query, turned);
+    axes_.front().turn_about_mean(query, turned);
     for (std::size_t t = 1; t < trees_.size(); ++t) mix(t, turned, turned + t * dim, dim);
+  }
+  /// How far the distance of a turned query from any turned point may be from that of the two as given.
+  [[nodiscard]] float rounding(const float* query) const noexcept {
+    // A product with a rotation of n axes moves a vector by at most (n + 1) sqrt(n) roundings of its length.
+    const auto share_of_length = [](std::size_t axes) {
+      const auto n = static_cast<float>(axes);
+      return (n + 1) * std::sqrt(n) * std::numeric_limits<float>::epsilon() / 2;
+    };
+    const float share =
+        share_of_length(dimension()) + share_of_length(mixed_) + 2 * std::numeric_limits<float>::epsilon();
+    return 1.01F * share * (radius_ + distance_from_mean(query));
+  }
+  /// The square of a query's distance from a point, by the coordinates given.
+  [[nodiscard]] float reduced_distance(const float* query, PointId id) const noexcept {
+    const std::size_t dim = dimension();
+    const float* point = rows_.data() + std::size_t{id} * dim;
+    float sum = 0;
+    for (std::size_t a = 0; a < dim; ++a) L2::accumulate(sum, query[a] - point[a], a);
+    return sum;
   }
 
 private:
+  [[nodiscard]] float distance_from_mean(const float* point) const noexcept {
+    const std::span<const float> mean = axes_.front().mean();
+    float sum = 0;
+    for (std::size_t a = 0; a < mean.size(); ++a) L2::accumulate(sum, point[a] - mean[a], a);
+    return std::sqrt(sum);
+  }
+
   /// Row by row an orthonormal basis from normal draws (Gram-Schmidt, twice for accuracy).
   [[nodiscard]] std::vector<float> random_rotation(Random& random) const {
-    std::vector<double> rows(mixed_ * mixed_);
+    std::vector<double> rows(detail::room_for(mixed_, mixed_, "RotatedForest"));
     for (std::size_t r = 0; r < mixed_; ++r) {
       double* row = &rows[r * mixed_];
       double length = 0;
@@ -122,7 +157,9 @@ private:
     std::copy(from + mixed_, from + dim, to + mixed_);
   }
 
+  std::vector<float> rows_;          ///< the points as given
   std::vector<PrincipalAxes> axes_;  ///< one, or none while there are no points
+  float radius_ = 0;                 ///< how far a point is from the mean at most
   std::size_t mixed_ = 0;
   std::vector<std::vector<float>> rotations_;
   std::vector<Tree> trees_;
@@ -130,22 +167,66 @@ private:
 
 namespace detail {
 
-/// Passes on each point once. Only points nearer than the limit matter, so the list stays short.
-template <class C>
-class OnlyOnce {
+/// Which points a search has met: a number a point, so that nothing is cleared between searches.
+class MetBefore {
 public:
-  OnlyOnce(C& collector, std::vector<PointId>& seen) : collector_(collector), seen_(seen) { seen_.clear(); }
-  [[nodiscard]] auto limit() const noexcept { return collector_.limit(); }
-  void offer(PointId id, float reduced) {
-    if (!(reduced < static_cast<float>(collector_.limit()))) return;
-    if (std::find(seen_.rbegin(), seen_.rend(), id) != seen_.rend()) return;
-    seen_.push_back(id);
-    collector_.offer(id, reduced);
+  void start(std::size_t points) {
+    if (stamps_.size() != points || now_ == std::numeric_limits<std::uint32_t>::max()) {
+      stamps_.assign(points, 0);
+      now_ = 0;
+    }
+    ++now_;
+  }
+  /// False when asked for the first time.
+  [[nodiscard]] bool operator()(PointId id) noexcept {
+    const bool met = stamps_[id] == now_;
+    stamps_[id] = now_;
+    return met;
   }
 
 private:
+  std::vector<std::uint32_t> stamps_;
+  std::uint32_t now_ = 0;
+};
+
+/// Passes on each point once, with its distance by the coordinates given. Trees hold it a rounding away, so
+/// they are asked for all that is nearer than the limit and that much.
+template <class Forest, class C>
+class MeasuredOnce {
+public:
+  MeasuredOnce(const Forest& forest, const float* query, C& collector, MetBefore& met)
+      : forest_(forest),
+        query_(query),
+        collector_(collector),
+        met_(met),
+        rounding_(forest.rounding(query)),
+        // Sums of squares, and bounds of cells at up to 32 splits, are rounded too.
+        growth_(1 + (static_cast<float>(forest.dimension()) + 160) * std::numeric_limits<float>::epsilon()) {
+    met.start(forest.size());
+    widen();
+  }
+  [[nodiscard]] float limit() const noexcept { return limit_; }
+  void offer(PointId id, float turned) {
+    if (!(turned < limit_) || met_(id)) return;  // the limit may have come down within a leaf
+    const float reduced = forest_.reduced_distance(query_, id);
+    if (!(reduced < static_cast<float>(collector_.limit()))) return;
+    collector_.offer(id, reduced);
+    widen();
+  }
+
+private:
+  void widen() {
+    const float reach = (std::sqrt(static_cast<float>(collector_.limit())) * growth_ + rounding_) * growth_;
+    limit_ = reach * reach;
+  }
+
+  const Forest& forest_;
+  const float* query_;
   C& collector_;
-  std::vector<PointId>& seen_;
+  MetBefore& met_;
+  float rounding_;
+  float growth_;
+  float limit_ = 0;
 };
 
 }  // namespace detail
@@ -156,12 +237,13 @@ class BestBinFirst<RotatedForest<Dim>> {
 public:
   using Real = float;
 
-  /// Offers each point at most once. Throws Error where the query is not finite or of another dimension.
-  /// Returns true where the answer is exact, up to the rounding of the rotations. `budget` is for all trees
-  /// together.
+  /// Offers each point at most once, with its distance as BruteForce computes it. Throws Error where the
+  /// query is not finite or of another dimension. Returns true where the answer is exact. `budget` is for all
+  /// trees together.
   template <Point Query, Collector<float> C>
   bool search(const RotatedForest<Dim>& forest, const Query& query, C& collector, Budget budget = {},
               Work* work = nullptr) {
+    detail::check_collector<C, L2>();
     if (forest.empty()) return true;
     const std::size_t dim = forest.dimension();
     row_.resize(dim);
@@ -175,9 +257,9 @@ public:
       trees_.push_back(&tree);
     }
     using Tree = typename RotatedForest<Dim>::Tree;
-    detail::OnlyOnce<C> once(collector, seen_);
-    return search_.search(std::span<const Tree* const>(trees_), std::span<const float* const>(queries_), once,
-                          budget, work);
+    detail::MeasuredOnce<RotatedForest<Dim>, C> measured(forest, row_.data(), collector, met_);
+    return search_.search(std::span<const Tree* const>(trees_), std::span<const float* const>(queries_),
+                          measured, budget, work);
   }
 
 private:
@@ -186,7 +268,7 @@ private:
   std::vector<const float*> queries_;
   std::vector<float> row_;
   std::vector<float> turned_;
-  std::vector<PointId> seen_;
+  detail::MetBefore met_;
 };
 
 }  // namespace cairn::inline CAIRN_ABI

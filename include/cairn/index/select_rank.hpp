@@ -18,6 +18,7 @@
 #include <cstring>
 #include <type_traits>
 
+#include <cairn/core/sizes.hpp>
 #include <cairn/index/block_lanes.hpp>
 #include <cairn/version.hpp>
 
@@ -25,7 +26,8 @@ namespace cairn::inline CAIRN_ABI::detail {
 
 /// Counts of records, as wide as their keys.
 template <class Scalar>
-using RankOf = std::conditional_t<sizeof(Scalar) == 1, std::int8_t, BitsOf<Scalar>>;
+using RankOf = std::conditional_t<sizeof(Scalar) == 1, std::int8_t,
+                                  std::conditional_t<sizeof(Scalar) == 2, std::int16_t, BitsOf<Scalar>>>;
 
 /// Few enough to be compared all with all.
 inline constexpr std::size_t few_keys = 48;
@@ -113,11 +115,11 @@ auto sampled_pivot(const Record* begin, std::size_t count, std::size_t wanted, K
   using Scalar = std::remove_cvref_t<decltype(key(*begin))>;
   const std::size_t size = count > 4000 ? few_keys : count > 400 ? 24 : 9;
   Scalar sample[few_keys] = {};
-  for (std::size_t i = 0; i < size; ++i) sample[i] = key(begin[count * (2 * i + 1) / (2 * size)]);
+  for (std::size_t i = 0; i < size; ++i) sample[i] = key(begin[share(count, 2 * i + 1, 2 * size)]);
   const double expected =
       static_cast<double>(wanted) / static_cast<double>(count) * static_cast<double>(size);
   const double margin = 0.4 * std::sqrt(static_cast<double>(size));
-  const bool early = 2 * wanted <= count;
+  const bool early = wanted <= count - wanted;
   const double aim = std::clamp(expected + (early ? margin : -margin), 0.0, static_cast<double>(size - 1));
   const auto rank = static_cast<RankOf<Scalar>>(aim);
   RankOf<Scalar> ranks[few_keys];

@@ -6,14 +6,14 @@
 ///
 ///   bytes 0-7    "cairnkd" and a zero
 ///   8-11         version of the format: 1           all numbers little-endian
-///   12-15        bytes a coordinate (1, 4 or 8)
+///   12-15        bytes a coordinate (1, 2, 4 or 8)
 ///   16-23        dimension
 ///   24-31        points
 ///   32-39        FNV-1a checksum (64 bits) of bytes 8-31 and of all from 40 on
 ///   40-          ids (4 bytes each), then coordinates, point by point in leaf order
 ///
-/// Loading checks the sum and every coordinate and splits the points anew, so that no damaged file makes a
-/// damaged tree; that costs a build (about 0.1 us a point in three dimensions).
+/// Loading checks the sum, every coordinate and every id and splits the points anew, so that no file, damaged
+/// or made up, makes a damaged tree; that costs a build (about 0.1 us a point in three dimensions).
 #pragma once
 
 #include <algorithm>
@@ -31,6 +31,8 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/index/kd_tree.hpp>
+#include <cairn/index/point_ids.hpp>
+#include <cairn/index/points.hpp>
 
 namespace cairn::inline CAIRN_ABI {
 
@@ -111,7 +113,7 @@ void save_tree(std::ostream& out, const KdTree<Scalar, Dim, M>& tree) {
 
 /// Reads a tree of the same kind, whose metric is not in the file. Throws Error, with `name` of the source,
 /// for what is no tree file, a newer version, another kind of coordinates or dimension, a truncated or
-/// damaged one.
+/// damaged one, and for coordinates and ids that no tree can have.
 template <class Tree, class Scalar = typename Tree::Coordinate>
 [[nodiscard]] Tree load_tree(std::istream& in, const std::string& name, typename Tree::Measure metric = {}) {
   const detail::TreeFileHeader expected;
@@ -128,12 +130,18 @@ template <class Tree, class Scalar = typename Tree::Coordinate>
     raise(name + ": dimension " + std::to_string(header.dimension) + ", expected " +
           (dim != dynamic_dim ? std::to_string(dim) : "at most 65536"));
   if (header.points >= no_point) raise(name + ": " + std::to_string(header.points) + " points are too many");
+  if (header.points > 0 && header.dimension == 0) raise(name + ": dimension 0, expected at least 1");
   const auto ids = detail::read_numbers<PointId>(in, header.points, name);
-  const auto rows = detail::read_numbers<Scalar>(in, header.points * header.dimension, name);
+  auto rows = detail::read_numbers<Scalar>(in, header.points * header.dimension, name);
   if (detail::checksum_of(header, ids, rows) != header.checksum)
     raise(name + ": the checksum is wrong, the tree file is damaged");
+  if (const auto bad = detail::bad_id(ids))
+    raise(name + ": point " + std::to_string(*bad) + " has the id " + std::to_string(ids[*bad]) +
+          ", expected one that no other point has and that is below 4294967295");
   if (ids.empty()) return Tree();
-  return Tree(Rows<Scalar>(rows, header.dimension), std::span<const PointId>(ids), std::move(metric));
+  const auto rows_dim = static_cast<std::size_t>(header.dimension);
+  detail::check_rows(rows, rows_dim, (name + ": point").c_str());
+  return Tree::from_rows(std::move(rows), rows_dim, ids, std::move(metric));
 }
 
 }  // namespace cairn::inline CAIRN_ABI

@@ -49,21 +49,21 @@ public:
   }
 
   /// Work of a whole merge, in points that are moved.
-  [[nodiscard]] static std::size_t work(std::size_t points) noexcept {
+  [[nodiscard]] static std::uint64_t work(std::size_t points) noexcept {
     return points + Builder::work(points);
   }
 
   /// Goes on until so much work has been done since the start.
-  void advance(std::size_t until) {
+  void advance(std::uint64_t until) {
     while (done_ < until) {
-      const std::size_t piece = source_ < task_.sources.size() ? gather() : builder_.advance();
+      const std::uint64_t piece = source_ < task_.sources.size() ? gather() : builder_.advance();
       if (piece == 0) return;
       done_ += piece;
     }
   }
 
   [[nodiscard]] std::shared_ptr<const Tree> finish() {
-    advance(std::numeric_limits<std::size_t>::max());
+    advance(std::numeric_limits<std::uint64_t>::max());
     const Tree& any = *task_.sources.front();
     return std::make_shared<const Tree>(Tree::from_parts(builder_.finish(), any.dimension(), any.metric()));
   }
@@ -72,10 +72,10 @@ private:
   using Builder = KdBuilder<typename Tree::Coordinate, Tree::fixed_dimension>;
   static constexpr std::size_t leaves_in_piece = 256;
 
-  std::size_t gather() {
+  std::uint64_t gather() {
     const Tree& source = *task_.sources[source_];
     const Range leaves{leaf_, std::min(leaf_ + leaves_in_piece, source.leaves())};
-    std::size_t points = 0;
+    std::uint64_t points = 0;
     source.blocks().for_each(leaves, [&](PointId id, auto row) {
       ++points;
       if (task_.states.empty() || task_.states[id] != PointState::erased) builder_.add(id, row.data());
@@ -92,7 +92,7 @@ private:
   Builder builder_;
   std::size_t source_ = 0;
   std::size_t leaf_ = 0;
-  std::size_t done_ = 0;
+  std::uint64_t done_ = 0;
 };
 
 /// A merge and when it ends, counted in updates of the index.
@@ -118,7 +118,7 @@ public:
   void advance(std::uint64_t updates) {
     if (!work_) return;
     const double share = static_cast<double>(updates - begin_) / static_cast<double>(due_ - begin_);
-    work_->advance(static_cast<std::size_t>(share * static_cast<double>(work_of_all_)));
+    work_->advance(static_cast<std::uint64_t>(share * static_cast<double>(work_of_all_)));
   }
 
   /// The merged tree; waits for the thread, or does what is left.
@@ -126,7 +126,7 @@ public:
 
 private:
   std::vector<std::shared_ptr<const Tree>> sources_;
-  std::size_t work_of_all_;
+  std::uint64_t work_of_all_;
   std::uint64_t begin_;
   std::uint64_t due_;
   std::optional<MergeWork<Tree>> work_;

@@ -21,6 +21,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <cairn/core/sizes.hpp>
 #include <cairn/version.hpp>
 #include <cairn/vision/integral_image.hpp>
 #include <cairn/vision/lanes.hpp>
@@ -58,7 +59,8 @@ public:
     const int columns = sums.width() + 1;
     phase_stride_ = (columns + step - 1) / step + IntegralImage::readable_overrun;
     row_stride_ = phase_stride_ * step;
-    copy_.resize(static_cast<std::size_t>(row_stride_) * (static_cast<std::size_t>(sums.height()) + 1));
+    copy_.resize(room_for(static_cast<std::size_t>(row_stride_), static_cast<std::size_t>(sums.height()) + 1,
+                          "image"));
     data_ = copy_.data();
     for (int y = 0; y <= sums.height(); ++y) {
       const std::uint32_t* const from = sums.row(y);

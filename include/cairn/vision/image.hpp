@@ -20,13 +20,14 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/sizes.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn::inline CAIRN_ABI {
 
 namespace detail {
 
-/// The longest side of an image: far beyond cameras, and small enough that no product of sides overflows.
+/// The longest side of an image: far beyond cameras, and small enough that sums of sides are ints.
 inline constexpr int longest_image_side = 1 << 20;
 
 inline void check_image_size(int width, int height) {
@@ -123,7 +124,7 @@ private:
     return width;
   }
   static std::size_t area(int width, int height) {
-    return static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+    return detail::room_for(static_cast<std::size_t>(width), static_cast<std::size_t>(height), "image");
   }
   [[nodiscard]] std::ptrdiff_t offset(int y) const noexcept {
     return static_cast<std::ptrdiff_t>(y) * width_;

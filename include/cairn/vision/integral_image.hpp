@@ -20,6 +20,7 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/sizes.hpp>
 #include <cairn/version.hpp>
 #include <cairn/vision/image.hpp>
 
@@ -40,7 +41,8 @@ public:
     width_ = image.width();
     height_ = image.height();
     stride_ = static_cast<std::ptrdiff_t>(width_) + 1 + readable_overrun;
-    sums_.resize(static_cast<std::size_t>(stride_) * (static_cast<std::size_t>(height_) + 1));
+    sums_.resize(
+        detail::room_for(static_cast<std::size_t>(stride_), static_cast<std::size_t>(height_) + 1, "image"));
     std::fill_n(sums_.data(), stride_, 0U);
     for (int y = 0; y < height_; ++y) add_row(image.row(y), row_at(y), row_at(y + 1));
   }

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include <cairn/core/check.hpp>
@@ -38,13 +39,16 @@ inline void keep_strongest(std::vector<Keypoint>& keypoints, std::size_t count) 
 }
 
 /// As keep_strongest, but each of columns x rows equal cells of the width x height image first gets an equal
-/// share of `count` for its own strongest; what cells leave unused goes to the strongest of the rest.
+/// share of `count` for its own strongest; what cells leave unused goes to the strongest of the rest. Of more
+/// cells than `count` none has a share, so the strongest of all are kept.
 inline void keep_strongest_spread(std::vector<Keypoint>& keypoints, std::size_t count, int width, int height,
                                   int columns, int rows) {
   CAIRN_EXPECTS(width > 0 && height > 0 && columns > 0 && rows > 0, "a grid has at least one cell");
+  const auto grid = static_cast<std::uint64_t>(columns) * static_cast<std::uint64_t>(rows);
+  if (grid > count) return keep_strongest(keypoints, count);
   std::sort(keypoints.begin(), keypoints.end(), stronger);
   if (keypoints.size() <= count) return;
-  const auto cells = static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows);
+  const auto cells = static_cast<std::size_t>(grid);
   const std::size_t share = count / cells;
   const auto index = [](float position, int length, int parts) {
     const double part = std::floor((double{position} + 0.5) * parts / length);

@@ -128,7 +128,8 @@ private:
     detector_(sums_, keypoints, threads_);
     const std::size_t count =
         options_.target_count > 0 ? static_cast<std::size_t>(options_.target_count) : keypoints.size();
-    if (options_.grid_columns * options_.grid_rows > 1 && options_.target_count > 0 && !keypoints.empty())
+    const bool grid = options_.grid_columns > 1 || options_.grid_rows > 1;
+    if (grid && options_.target_count > 0 && !keypoints.empty())
       keep_strongest_spread(keypoints, count, sums_.width(), sums_.height(), options_.grid_columns,
                             options_.grid_rows);
     else

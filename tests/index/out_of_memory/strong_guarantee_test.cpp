@@ -16,6 +16,7 @@
 
 #include <cairn/index/best_bin_first.hpp>
 #include <cairn/index/bulk_match.hpp>
+#include <cairn/index/landmark_map.hpp>
 #include <cairn/index/multi_kd_tree.hpp>
 #include <cairn/index/tree_file.hpp>
 
@@ -131,9 +132,121 @@ long check_change(cairn::Merging merging, cairn::PointId erased, const std::vect
   }
 }
 
+using Store = cairn::MultiTreeStore<3>;
+
+/// A store some steps old: base landmarks, some erased, others on probation, some added in the open step.
+Store make_store() {
+  cairn::Random random(11);
+  Store store(
+      {.probation = {.base_seen_times = 2, .max_nonbase_time = 3}, .shape = {.first_size = 8, .growth = 2}});
+  for (int step = 0; step < 6; ++step) {
+    cairn::LandmarkId last = 0;
+    for (const Point& point : random_points(12, random)) last = store.add(point);
+    if (step > 0)
+      for (cairn::LandmarkId id = last - 23; id < last - 16; ++id) store.sighted(id);
+    if (step < 5) store.advance();
+  }
+  for (cairn::LandmarkId id = 0; id < 14; ++id) store.erase(id);
+  return store;
+}
+
+/// What can be seen of a store without a ratio test's limits: who is there, as what, and the nearest to each
+/// query, told only where it is no twin of another.
+std::vector<float> answers_of(const Store& store, const std::vector<Point>& queries) {
+  std::vector<float> all{static_cast<float>(store.size()), static_cast<float>(store.base_size())};
+  for (cairn::LandmarkId id = 0; id < 100; ++id)
+    all.push_back(static_cast<float>(store.contains(id)) + 2 * static_cast<float>(store.is_base(id)));
+  for (const Point& query : queries) {
+    const auto match = store.match(query, 0, {.ratio = 1.001F});
+    all.push_back(match ? static_cast<float>(match->id) : -1);
+    all.push_back(match ? match->distance : -1);
+  }
+  return all;
+}
+
+/// Fails every allocation of `change` in turn on a store of its own, prepared, which must stay as it was;
+/// returns how many there are.
+template <class Prepare, class Change>
+long check_store(const std::vector<Point>& queries, Prepare&& prepare, Change&& change) {
+  Store changed = make_store();
+  prepare(changed);
+  const std::vector<float> before = answers_of(changed, queries);
+  change(changed);
+  const std::vector<float> after = answers_of(changed, queries);
+  const Point far{9, 9, 9};  // from all others
+  for (long allowed = 0;; ++allowed) {
+    Store store = make_store();
+    prepare(store);
+    const bool done = enough(allowed, [&] { change(store); });
+    CAPTURE(allowed);
+    REQUIRE(answers_of(store, queries) == (done ? after : before));
+    if (done) return allowed;
+    change(store);
+    REQUIRE(answers_of(store, queries) == after);
+    const cairn::LandmarkId id = store.add(far);  // numbers still mean the same to all parts of the store
+    store.advance();
+    REQUIRE(store.match(far, 0, {}).value_or(cairn::LandmarkMatch{}).id == id);
+  }
+}
+
 }  // namespace
 
 TEST_SUITE("out_of_memory") {
+  TEST_CASE("out_of_memory: a landmark store keeps all that it had when adding, erasing or merging fails") {
+    cairn::Random random(12);
+    const auto queries = random_points(12, random);
+    const auto as_it_is = [](Store&) {};
+    long most = 0;  // some addition finds every list full
+    for (std::size_t added = 0; added < 70; ++added) {
+      const auto add_some = [&](Store& store) {
+        for (std::size_t i = 0; i < added; ++i) store.add(queries[i % queries.size()]);
+      };
+      most = std::max(most, check_store(queries, add_some, [&](Store& store) { store.add(queries[1]); }));
+    }
+    CHECK(most > 1);
+    check_store(queries, as_it_is, [&](Store& store) { store.merge(45, 28); });
+    most = 0;  // the erasure that leaves more dead than alive in the trees of base landmarks
+    for (cairn::LandmarkId id = 14; id < 50; ++id) {
+      const auto erase_those_before = [&](Store& store) {
+        for (cairn::LandmarkId before = 14; before < id; ++before) store.erase(before);
+      };
+      most = std::max(most, check_store(queries, erase_those_before, [&](Store& store) { store.erase(id); }));
+    }
+    CHECK(most > 4);
+  }
+
+  TEST_CASE(
+      "out_of_memory: a step of a landmark store that fails loses nobody, and the next makes up for it") {
+    cairn::Random random(13);
+    const auto queries = random_points(30, random);
+    Store expected = make_store();
+    expected.advance();
+    expected.advance();
+    const std::vector<float> after = answers_of(expected, queries);
+    const std::vector<float> before = answers_of(make_store(), queries);
+    long failed = 0;
+    for (bool done = false; !done; ++failed) {
+      CAPTURE(failed);
+      Store store = make_store();
+      done = enough(failed, [&] { store.advance(); });
+      if (!done) {
+        // The step may have ended or not. What is matched is there, and no landmark is its own twin.
+        std::size_t matched = 0;
+        for (const Point& query : queries)
+          if (const auto match = store.match(query, 0, {.ratio = 1.001F}))
+            matched += store.contains(match->id);
+        CHECK(matched >= queries.size() / 2);
+        const bool ended = store.ledger().step() == 6;
+        if (!ended) store.advance();
+        CHECK(store.ledger().step() == 6);
+      }
+      store.advance();
+      REQUIRE(answers_of(store, queries) == after);
+    }
+    CHECK(failed > 10);
+    CHECK(before != after);
+  }
+
   TEST_CASE("out_of_memory: an insertion, an erasure or a rebuilding that fails leaves the index as it was") {
     cairn::Random random(8);
     const auto points = random_points(35, random);
