@@ -256,26 +256,32 @@ void add_loop(example::Report& page, const Results& r) {
 #endif
 }
 
+}  // namespace
+
 std::string errors_csv(const StraightResult& result) {
-  std::string text = "time";
-  for (const StateName& name : state_names)
-    for (const char* kind : {"_rms", "_sigma", "_bound"}) text += std::string(",") + name.symbol + kind;
-  text += ",nees\n";
-  for (std::size_t k = 0; k < result.time.size(); ++k) {
-    cairn::append_number(text, result.time[k]);
-    for (std::size_t i = 0; i < state_names.size(); ++i)
-      for (const auto* series : {&result.rms_error[i], &result.sigma[i], &result.bound[i]}) {
-        text += ',';
-        cairn::append_number(text, (*series)[k]);
-      }
-    text += ',';
-    cairn::append_number(text, result.nees[k]);
-    text += '\n';
+  std::vector<std::string> names{"time"};
+  std::vector<const std::vector<double>*> columns{&result.time};
+  for (std::size_t i = 0; i < state_names.size(); ++i) {
+    for (const char* kind : {"_rms", "_sigma", "_bound"})
+      names.push_back(std::string(state_names[i].symbol) + kind);
+    for (const auto* of : {&result.rms_error[i], &result.sigma[i], &result.bound[i]}) columns.push_back(of);
   }
+  names.emplace_back("nees");
+  columns.push_back(&result.nees);
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ",") + name;
+  text += '\n';
+  for (std::size_t k = 0; k < result.time.size(); ++k)
+    for (std::size_t column = 0; column < columns.size(); ++column) {
+      const double value = (*columns[column])[k];
+      if (!std::isfinite(value))
+        cairn::raise("errors.csv: not written, " + names[column] + " of row " + std::to_string(k + 1) +
+                     " is not finite");
+      cairn::append_number(text, value);
+      text += column + 1 < columns.size() ? ',' : '\n';
+    }
   return text;
 }
-
-}  // namespace
 
 std::string summary(const Results& r) {
   nlohmann::ordered_json json;

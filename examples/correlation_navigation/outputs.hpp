@@ -33,6 +33,10 @@ struct Results {
   LoopResult loop;
 };
 
+/// Errors, sigmas and bounds of the straight flight against time. Throws cairn::Error naming the column and
+/// the row of a number that is not finite.
+[[nodiscard]] std::string errors_csv(const StraightResult& result);
+
 /// The summary as JSON text.
 [[nodiscard]] std::string summary(const Results& results);
 

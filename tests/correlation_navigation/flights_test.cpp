@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <string>
 
 #include <doctest/doctest.h>
@@ -178,6 +179,9 @@ TEST_SUITE("correlation_navigation") {
     CHECK(json["divergence_rate"][0]["initial_error_over_correlation_length"] == 0.5);
     CHECK(json["rmse_over_crb"] == results.straight.rmse_over_bound);
     CHECK(cairn::read_file(folder / "out" / "errors.csv").find("time,x_rms,x_sigma") == 0);
+    results.straight.sigma[1][1] = std::numeric_limits<double>::quiet_NaN();
+    CHECK(cairn_test::message_of([&] { static_cast<void>(errors_csv(results.straight)); }) ==
+          "errors.csv: not written, V_sigma of row 2 is not finite");
     folder.put("file", "x");
     CHECK(cairn_test::message_of([&] {
             write_outputs(results, folder / "file" / "out");
