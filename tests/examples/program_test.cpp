@@ -2,23 +2,18 @@
 // SPDX-License-Identifier: MIT
 //
 // The program as a user meets it: its exit code, its words and what it leaves behind.
-#include <chrono>
+#include "support/program.hpp"
+
 #include <csignal>
-#include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
+#include <initializer_list>
 #include <set>
 #include <string>
-#include <thread>
 
 #include <doctest/doctest.h>
-#include <fcntl.h>
 #include <nlohmann/json.hpp>
 #include <sys/mount.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <cairn/io/file.hpp>
 #include <cairn/io/trajectory.hpp>
@@ -31,41 +26,29 @@ namespace program_test {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct Outcome {
-  int code;
-  std::string words;
-};
+using cairn_test::names_in;
+using cairn_test::Outcome;
 
 /// Rendered pictures are kept from one case to the next, not from one run of the tests to the next.
-std::string cache() {
+void keep_pictures() {
   static const cairn_test::Folder folder;
-  return folder.path().string();
+  ::setenv("XDG_CACHE_HOME", folder.path().c_str(), 1);
 }
 
-Outcome run(const std::string& arguments, const cairn_test::Folder& folder,
-            const std::string& standard_output = "") {
-  const fs::path words = folder / "words.txt";
-  const std::string command = std::string("XDG_CACHE_HOME=\"") + cache() + "\" \"" + STEREO_SLAM_PROGRAM +
-                              "\" " + arguments + " 2>\"" + words.string() + "\" >" +
-                              (standard_output.empty() ? "&2" : standard_output);
-  const int status = std::system(command.c_str());  // NOLINT(cert-env33-c): our own program
-  std::ifstream file(words);
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, {std::istreambuf_iterator<char>(file), {}}};
+Outcome run(const std::string& arguments, const std::string& standard_output = "") {
+  keep_pictures();
+  return cairn_test::run_program(std::string("\"") + STEREO_SLAM_PROGRAM + "\" " + arguments,
+                                 standard_output);
 }
 
-bool says(const Outcome& outcome, const std::string& word) {
-  return outcome.words.find(word) != std::string::npos;
+int run_and_interrupt(const fs::path& out, int frames, std::initializer_list<int> signals) {
+  keep_pictures();
+  return cairn_test::interrupt_program(
+      {STEREO_SLAM_PROGRAM, "--frames", std::to_string(frames), "--out", out.string()}, signals);
 }
 
 nlohmann::json summary_in(const fs::path& out) {
   return nlohmann::json::parse(cairn::read_file(out / "summary.json"));
-}
-
-std::set<std::string> names_in(const fs::path& folder) {
-  std::set<std::string> names;
-  for (const auto& entry : fs::directory_iterator(folder)) names.insert(entry.path().filename().string());
-  return names;
 }
 
 std::set<std::string> results() {
@@ -77,7 +60,7 @@ std::set<std::string> results() {
 /// A drive of `frames` frames in the folder "drive".
 void make_drive(const cairn_test::Folder& folder, int frames) {
   const Outcome outcome =
-      run("--frames " + std::to_string(frames) + " --dump \"" + (folder / "drive").string() + "\"", folder);
+      run("--frames " + std::to_string(frames) + " --dump \"" + (folder / "drive").string() + "\"");
   CAPTURE(outcome.words);
   REQUIRE(outcome.code == 0);
 }
@@ -87,79 +70,37 @@ void tear(const fs::path& file) {
   cairn::write_file_atomically(file, bytes.substr(0, bytes.size() / 2));
 }
 
-/// Whether a process has a handler of its own for the signal.
-bool handles(pid_t process, int signal) {
-  std::ifstream status("/proc/" + std::to_string(process) + "/status");
-  for (std::string line; std::getline(status, line);)
-    if (line.starts_with("SigCgt:"))
-      return (std::stoull(line.substr(7), nullptr, 16) >> static_cast<unsigned>(signal - 1) & 1U) != 0;
-  return false;
-}
-
-/// Starts the program, sends it the signals, the first when it says that it has come somewhere, and returns
-/// its exit code; minus the signal where that ended it. Each signal is sent when the one before was taken.
-int run_and_interrupt(const cairn_test::Folder& folder, int frames, std::initializer_list<int> signals) {
-  int words[2];
-  REQUIRE(::pipe(words) == 0);
-  const std::string out = (folder / "out").string(), count = std::to_string(frames), pictures = cache();
-  const pid_t child = ::fork();
-  REQUIRE(child >= 0);
-  if (child == 0) {
-    ::setenv("XDG_CACHE_HOME", pictures.c_str(), 1);
-    ::dup2(words[1], STDERR_FILENO);
-    ::dup2(::open("/dev/null", O_WRONLY), STDOUT_FILENO);
-    ::close(words[0]);
-    ::execl(STEREO_SLAM_PROGRAM, "stereo_slam", "--frames", count.c_str(), "--out", out.c_str(), nullptr);
-    ::_exit(127);
-  }
-  ::close(words[1]);
-  char letter = 0;
-  while (::read(words[0], &letter, 1) == 1 && letter != '\n') continue;
-  for (const int signal : signals) {
-    ::kill(child, signal);
-    while (handles(child, signal)) std::this_thread::sleep_for(std::chrono::milliseconds(1));
-  }
-  while (::read(words[0], &letter, 1) == 1) continue;  // a pipe that nobody reads would end it as well
-  ::close(words[0]);
-  int status = 0;
-  REQUIRE(::waitpid(child, &status, 0) == child);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
-}
-
 }  // namespace
 
 TEST_SUITE("program") {
   TEST_CASE("stereo_slam: --help names every option and ends well") {
-    const cairn_test::Folder folder;
-    const Outcome help = run("--help", folder);
+    const Outcome help = run("--help");
     CHECK(help.code == 0);
     for (const char* option :
          {"--dataset", "--out", "--frames", "--seed", "--threads", "--store", "--points", "kitti_raw"}) {
       CAPTURE(option);
-      CHECK(says(help, option));
+      CHECK(help.says(option));
     }
   }
 
   TEST_CASE("stereo_slam: a mistake on the command line is exit code 2 and a sentence") {
-    const cairn_test::Folder folder;
     for (const std::string mistake :
          {"--store forest", "--points many", "--threads 0", "--frames -3", "--frames 1e99", "--nonsense",
           "--script up", "--seed -1", "--seed 99999999999999999999", "--drift nan", "--drift 1e308", "--out",
           "somewhere", "--frames 99999999999999999999999999999999999999999999999999999999999999"}) {
       CAPTURE(mistake);
-      const Outcome outcome = run(mistake, folder);
+      const Outcome outcome = run(mistake);
       CAPTURE(outcome.words);
       CHECK(outcome.code == 2);
       CHECK(outcome.words.size() > 10);
       CHECK(outcome.words.size() < 200);
     }
-    CHECK(run("--dataset nowhere", folder).code == 2);
-    CHECK(says(run("--frames -3", folder), "--frames: expected a whole number of at least 0, found '-3'"));
+    CHECK(run("--dataset nowhere").code == 2);
+    CHECK(run("--frames -3").says("--frames: expected a whole number of at least 0, found '-3'"));
   }
 
   TEST_CASE("stereo_slam: --version says which") {
-    const cairn_test::Folder folder;
-    const Outcome version = run("--version", folder);
+    const Outcome version = run("--version");
     CHECK(version.code == 0);
     CHECK(version.words == "stereo_slam " CAIRN_VERSION_STRING "\n");
   }
@@ -168,10 +109,9 @@ TEST_SUITE("program") {
     const cairn_test::Folder folder;
     for (const std::string asked : {"--help", "--version", "--frames 2"}) {
       CAPTURE(asked);
-      const Outcome outcome =
-          run(asked + " --out \"" + (folder / "out").string() + "\"", folder, "/dev/full");
+      const Outcome outcome = run(asked + " --out \"" + (folder / "out").string() + "\"", "/dev/full");
       CHECK(outcome.code == 2);
-      CHECK(says(outcome, "cannot write to the standard output (No space left on device)"));
+      CHECK(outcome.says("cannot write to the standard output (No space left on device)"));
     }
     CHECK(names_in(folder / "out") == results());  // they are there all the same
   }
@@ -183,11 +123,11 @@ TEST_SUITE("program") {
     const std::string arguments = "--dataset kitti_odometry \"" + (folder / "drive").string() +
                                   "\" --out \"" + (folder / "out").string() + "\"";
     for (const std::string threads : {"1", "2"}) {
-      const Outcome outcome = run(arguments + " --threads " + threads, folder);
+      const Outcome outcome = run(arguments + " --threads " + threads);
       CAPTURE(outcome.words);
       CHECK(outcome.code == 3);
-      CHECK(says(outcome, "stereo_slam: ended after 5 of 8 frames: "));
-      CHECK(says(outcome, "000005.png: damaged PNG"));
+      CHECK(outcome.says("stereo_slam: ended after 5 of 8 frames: "));
+      CHECK(outcome.says("000005.png: damaged PNG"));
       CHECK(names_in(folder / "out") == results());
       const nlohmann::json summary = summary_in(folder / "out");
       CHECK(summary["frames"] == 5);
@@ -201,12 +141,12 @@ TEST_SUITE("program") {
     make_drive(folder, 3);
     const std::string arguments = "--dataset kitti_odometry \"" + (folder / "drive").string() +
                                   "\" --out \"" + (folder / "out").string() + "\"";
-    REQUIRE(run(arguments, folder).code == 0);
+    REQUIRE(run(arguments).code == 0);
     tear(folder / "drive" / "image_0" / "000000.png");
-    const Outcome outcome = run(arguments, folder);
+    const Outcome outcome = run(arguments);
     CAPTURE(outcome.words);
     CHECK(outcome.code == 2);
-    CHECK(says(outcome, "000000.png: damaged PNG"));
+    CHECK(outcome.says("000000.png: damaged PNG"));
     CHECK(summary_in(folder / "out")["frames"] == 3);
   }
 
@@ -214,7 +154,7 @@ TEST_SUITE("program") {
     for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
       CAPTURE(signal);
       const cairn_test::Folder folder;
-      CHECK(run_and_interrupt(folder, 30, {signal}) == 4);
+      CHECK(run_and_interrupt(folder / "out", 30, {signal}) == 4);
       CHECK(names_in(folder / "out") == results());
       const nlohmann::json summary = summary_in(folder / "out");
       const auto frames = summary["frames"].get<std::size_t>();
@@ -229,8 +169,8 @@ TEST_SUITE("program") {
 
   TEST_CASE("stereo_slam: interrupted twice, it ends at once") {
     const cairn_test::Folder folder;
-    CHECK(run_and_interrupt(folder, 30, {SIGINT, SIGINT}) == -SIGINT);
-    CHECK(run_and_interrupt(folder, 30, {SIGTERM, SIGINT}) == -SIGINT);
+    CHECK(run_and_interrupt(folder / "out", 30, {SIGINT, SIGINT}) == -SIGINT);
+    CHECK(run_and_interrupt(folder / "out", 30, {SIGTERM, SIGINT}) == -SIGINT);
   }
 
   TEST_CASE("stereo_slam: a full disk is said to be full, and the results of the run before stay") {
@@ -245,10 +185,10 @@ TEST_SUITE("program") {
     fs::create_directory(out);
     cairn::write_file_atomically(out / "trajectory.tum", "of another run\n");
     cairn::write_file_atomically(out / "report.html", std::string(250000, 'x'));  // leaves too little
-    const Outcome outcome = run(arguments, folder);
+    const Outcome outcome = run(arguments);
     CAPTURE(outcome.words);
     CHECK(outcome.code == 2);
-    CHECK(says(outcome, "No space left on device"));
+    CHECK(outcome.says("No space left on device"));
     CHECK(cairn::read_file(out / "trajectory.tum") == "of another run\n");
     CHECK(names_in(folder / "small") == std::set<std::string>{"out"});
     CHECK(names_in(out) == std::set<std::string>{"trajectory.tum", "report.html"});
@@ -260,9 +200,9 @@ TEST_SUITE("program") {
     for (const std::string kind : {"kitti_odometry", "kitti_raw", "euroc"}) {
       CAPTURE(kind);
       const Outcome outcome =
-          run("--dataset " + kind + " /no/such/drive --out \"" + (folder / "out").string() + "\"", folder);
+          run("--dataset " + kind + " /no/such/drive --out \"" + (folder / "out").string() + "\"");
       CHECK(outcome.code == 2);
-      CHECK(says(outcome, "/no/such/drive"));
+      CHECK(outcome.says("/no/such/drive"));
       CHECK_FALSE(fs::exists(folder / "out"));
     }
   }
@@ -270,17 +210,16 @@ TEST_SUITE("program") {
   TEST_CASE("stereo_slam: an output folder that cannot be is named before the work begins") {
     const cairn_test::Folder folder;
     folder.put("file", "not a folder");
-    const Outcome outcome = run("--frames 2 --out \"" + (folder / "file").string() + "\"", folder);
+    const Outcome outcome = run("--frames 2 --out \"" + (folder / "file").string() + "\"");
     CHECK(outcome.code == 2);
-    CHECK(says(outcome, (folder / "file").string()));
+    CHECK(outcome.says((folder / "file").string()));
   }
 
   TEST_CASE("stereo_slam: every file is the same bytes for 1, 2 and 3 threads and the next time, but times") {
     const cairn_test::Folder folder;
     for (const std::string out : {"1", "2", "3", "2 again"}) {
       const Outcome outcome = run("--frames 4 --threads " + out.substr(0, 1) + " --out \"" +
-                                      (folder / ("out " + out)).string() + "\"",
-                                  folder);
+                                  (folder / ("out " + out)).string() + "\"");
       CAPTURE(outcome.words);
       REQUIRE(outcome.code == 0);
       REQUIRE(names_in(folder / ("out " + out)) == results());
