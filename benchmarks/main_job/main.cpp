@@ -134,7 +134,8 @@ void add_rate_rows(Scoreboard& board, const Workspace& workspace) {
 
 }  // namespace
 
-int main() {
+int main(int argc, char** argv) {
+  if (const auto code = cairn_bench::answer(argc, argv, "scoreboard_main_job")) return *code;
   Scoreboard board("main_job");
   const Workspace workspace;
   add_arena_rows(board, workspace);
