@@ -55,7 +55,7 @@ cairn::StereoRig rectified_rig(const Path& file) {
   if (!(baseline > 0))
     cairn::raise(file.string() +
                  ": expected the second camera to the right of the first, found a baseline of " +
-                 std::to_string(baseline) + " m");
+                 cairn::shortest(baseline) + " m");
   rig.T_left_right = {{}, {baseline, 0, 0}};
   return rig;
 }

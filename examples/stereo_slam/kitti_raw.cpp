@@ -111,7 +111,7 @@ std::optional<double> seconds_of(std::string_view text) {
   };
   const int hour = part(11, 2), minute = part(14, 2);
   const std::optional<double> second = cairn::parse_number(text.substr(17));
-  if (hour > 23 || minute > 59 || !second || !(*second < 61)) return std::nullopt;  // 60 is a leap second
+  if (hour > 23 || minute > 59 || !second || !(*second < 60)) return std::nullopt;
   const std::chrono::year_month_day date{std::chrono::year(part(0, 4)),
                                          std::chrono::month(static_cast<unsigned>(part(5, 2))),
                                          std::chrono::day(static_cast<unsigned>(part(8, 2)))};

@@ -134,7 +134,7 @@ int image_side(double value, const std::filesystem::path& file) {
   constexpr double longest = 65536;
   if (!(value >= 1 && value <= longest))
     cairn::raise(file.string() + ": expected an image size of 1 to 65536 pixels a side, found " +
-                 std::to_string(value));
+                 cairn::shortest(value));
   return static_cast<int>(std::lround(value));
 }
 

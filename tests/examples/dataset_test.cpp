@@ -349,7 +349,8 @@ TEST_SUITE("dataset") {
                  {"calib_cam_to_cam.txt: lacks the key " + key + "; expected '" + key + ":'"}));
     CHECK(says(broken(calibration("R_01: 0 -1", "R_01: 0 -2")), {"calib_cam_to_cam.txt", "rotation matrix"}));
     CHECK(says(broken(calibration("K_00: 100", "K_00: -100")), {"calib_cam_to_cam.txt", "focal"}));
-    CHECK(says(broken(calibration("S_00: 12", "S_00: 1e99")), {"calib_cam_to_cam.txt", "image size"}));
+    CHECK(says(broken(calibration("S_00: 12", "S_00: 1e99")),
+               {"calib_cam_to_cam.txt", "image size", "found 1e+99"}));
     CHECK(says(broken(calibration("S_00: 12", "S_00: 13")), {"0000000001.png", "expected 13 x 8"}));
     CHECK(says(broken([](F f) { fs::remove(f / "calib_cam_to_cam.txt"); }),
                {"calib_cam_to_cam.txt: no such file", "expected the calibration"}));
@@ -361,7 +362,7 @@ TEST_SUITE("dataset") {
     CHECK(says(broken([](F f) { f.put("image_00/timestamps.txt", "2011-09-26 23:59:59.0\n"); }),
                {"timestamps.txt: holds 1 times; expected one for each frame up to the last, 5"}));
     for (const std::string stamp :
-         {"2011-09-26 14:05:nan", "2011-09-26 14:05:inf", "2011-09-26 14:05:61.0", "2011-09-26 14:60:00",
+         {"2011-09-26 14:05:nan", "2011-09-26 14:05:inf", "2011-09-26 14:05:60.0", "2011-09-26 14:60:00",
           "2011-09-26 24:00:00", "2011-02-29 14:05:00", "2011-13-01 14:05:00", "2011-09-26 14:05:-1",
           "2011-09-26 14:05:1e1", "2011-09-26 14:05:00.", "2011-09-26 14:05:00.5x", "2011-09-26T14:05:00",
           "2011/09/26 14:05:00", "+011-09-26 14:05:00", "2011-09-26 14:05", "14:05:00", "nan",
@@ -377,7 +378,6 @@ TEST_SUITE("dataset") {
     CHECK(says(broken([](F f) { replace_in(f / "image_00/timestamps.txt", "59.2", "59.0"); }),
                {"timestamps.txt:3", "times that do not run backwards"}));
     CHECK(broken([](F f) { replace_in(f / "image_00/timestamps.txt", "59.2", "59.1"); }).empty());
-    CHECK(broken([](F f) { replace_in(f / "image_00/timestamps.txt", "59.500000000", "60.9"); }).empty());
     CHECK(says(broken([](F f) {
                  for (const int camera : {0, 1})
                    fs::rename(f.image(camera, 5),

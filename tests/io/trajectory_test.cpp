@@ -116,6 +116,7 @@ TEST_SUITE("trajectory") {
     CHECK(refusal(good + "2 1,5 0 0 0 0 0 1\n").find("('1,5' is none)") != std::string::npos);
     CHECK(refusal(good + "2 0 0 0 0.7 0.7 0.7 0.7\n").find("a quaternion of length 1, not 1.4") !=
           std::string::npos);
+    CHECK(refusal(good + "2 0 0 0 1e150 0 0 0\n").find("not 1e+150, found") != std::string::npos);
     CHECK(refusal(good + "2 0 0 0 0 0 0 0\n").find("a quaternion of length 1") != std::string::npos);
     CHECK(refusal(good + "0.5 0 0 0 0 0 0 1\n").find("times that do not run backwards") != std::string::npos);
     CHECK(refusal("").find("found the end of the file") != std::string::npos);

@@ -56,8 +56,7 @@ inline SE3 pose_of_quaternion(const TextLines& lines, const double* position, do
                               double z) {
   constexpr double tolerance = 0.01;  // three printed digits leave 0.001
   const double length = std::sqrt(w * w + x * x + y * y + z * z);
-  if (std::abs(length - 1.0) > tolerance)
-    lines.fail("a quaternion of length 1, not " + std::to_string(length));
+  if (std::abs(length - 1.0) > tolerance) lines.fail("a quaternion of length 1, not " + shortest(length));
   return SE3(SO3::from_quaternion(w, x, y, z), Vector<3>(position[0], position[1], position[2]));
 }
 
@@ -228,7 +227,7 @@ inline void write_euroc(const std::filesystem::path& path, const Trajectory& tra
   detail::expect_writable(path, trajectory);
   for (const StampedPose& pose : trajectory)
     if (std::abs(pose.time) >= 9.2e9)
-      raise(path.string() + ": not written, a time of " + std::to_string(pose.time) +
+      raise(path.string() + ": not written, a time of " + shortest(pose.time) +
             " s is no number of nanoseconds");
   std::string text = "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w,q_x,q_y,q_z\n";
   for (const StampedPose& pose : trajectory) {
