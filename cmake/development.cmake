@@ -6,6 +6,7 @@ endif()
 
 option(CAIRN_WARNINGS_AS_ERRORS "Treat warnings as errors" ${PROJECT_IS_TOP_LEVEL})
 set(CAIRN_SANITIZE "" CACHE STRING "Sanitizers of the project's own targets, e.g. address,undefined")
+option(CAIRN_FUZZ "Build the fuzz targets of tests/fuzz as programs of clang's libFuzzer" OFF)
 option(CAIRN_NATIVE "Compile the project's own targets with -march=native" OFF)
 
 add_library(cairn_development INTERFACE)
@@ -20,7 +21,10 @@ if(CAIRN_SANITIZE)
   # Null, overflowing and out-of-object pointers fault or reach the address sanitizer as well; checking each by itself
   # makes the objects 1.7 times as large and a third slower to compile.
   target_compile_options(cairn_development INTERFACE
-    -fsanitize=${CAIRN_SANITIZE} -fno-sanitize=null,pointer-overflow,object-size,vptr
+    -fsanitize=${CAIRN_SANITIZE} $<$<NOT:$<BOOL:${CAIRN_FUZZ}>>:-fno-sanitize=null,pointer-overflow,object-size,vptr>
     -fno-sanitize-recover=all -fno-omit-frame-pointer)
   target_link_options(cairn_development INTERFACE -fsanitize=${CAIRN_SANITIZE})
+endif()
+if(CAIRN_FUZZ)
+  target_compile_options(cairn_development INTERFACE -fsanitize=fuzzer-no-link)  # the fuzzer sees which way was taken
 endif()

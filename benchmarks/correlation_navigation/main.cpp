@@ -153,7 +153,8 @@ void add_time_rows(Scoreboard& board) {
 
 }  // namespace
 
-int main() {
+int main(int argc, char** argv) {
+  if (const auto code = cairn_bench::answer(argc, argv, "scoreboard_correlation_navigation")) return *code;
   const unsigned threads = std::max(1U, std::thread::hardware_concurrency());
   Scoreboard board("correlation_navigation");
   add_time_rows(board);

@@ -5,8 +5,8 @@
 // independent runs, as markdown tables with the bands in which a consistent filter stays 99 % of the time.
 #include <cstdint>
 #include <cstdio>
-#include <cstdlib>
 #include <string>
+#include <string_view>
 #include <type_traits>
 
 #include <cairn/filter/augmented.hpp>
@@ -19,8 +19,11 @@
 #include <cairn/filter/square_root_information.hpp>
 #include <cairn/filter/ud.hpp>
 #include <cairn/filter/unscented.hpp>
+#include <cairn/io/text.hpp>
+#include <cairn/version.hpp>
 
 #include "filter/consistency_study.hpp"
+#include "support/scoreboard.hpp"
 
 namespace {
 
@@ -87,9 +90,17 @@ void table(const Scenario& scenario) {
 }  // namespace
 
 int main(int count, char** arguments) {
-  if (count > 1) runs = std::atoi(arguments[1]);
-  if (runs < 1) {
-    std::fprintf(stderr, "usage: filter_consistency [runs >= 1]\n");
+  constexpr const char* usage = "usage: filter_consistency [runs, 1 to 1000000]\n";
+  if (count == 2) {
+    const std::string_view word = arguments[1];
+    if (word == "--help" || word == "-h" || word == "--version") {
+      std::printf("%s", word == "--version" ? "filter_consistency " CAIRN_VERSION_STRING "\n" : usage);
+      return cairn_bench::flush_standard_output("filter_consistency") ? 0 : 1;
+    }
+    runs = cairn::parse_number<int>(word).value_or(0);
+  }
+  if (count > 2 || runs < 1 || runs > 1000000) {
+    std::fprintf(stderr, "%s", usage);
     return 2;
   }
   std::printf("%d runs of %d steps, seed %d\n", runs, steps, static_cast<int>(seed));
@@ -98,5 +109,5 @@ int main(int count, char** arguments) {
   table(cairn_test::CirclingVehicle{});
   table(cairn_test::CompassVehicle{});
   std::printf("\n%d values outside the 99.99 %% band, or rows with refused steps\n", outside);
-  return 0;
+  return cairn_bench::flush_standard_output("filter_consistency") ? 0 : 1;
 }

@@ -87,7 +87,8 @@ void absolute(Scoreboard& board, const std::string& name, const Run& run, int co
 
 }  // namespace
 
-int main() {
+int main(int argc, char** argv) {
+  if (const auto code = cairn_bench::answer(argc, argv, "scoreboard_filter")) return *code;
   Scoreboard board("filter");
   const Rival us = ours(), points = ours_unscented(), factored = ours_factored();
   const std::vector<Rival> rivals{openkf(), mherb(), tinyekf(), opencv(), bfl(), hand_written()};

@@ -8,6 +8,9 @@
 
 /// Without arguments all rows; otherwise the parts named: low, descriptors, growing.
 int main(int argc, char** argv) {
+  if (const auto code =
+          cairn_bench::answer(argc, argv, "scoreboard_index", {"low", "descriptors", "growing"}))
+    return *code;
   const std::vector<std::string_view> parts(argv + 1, argv + argc);
   const auto wanted = [&](std::string_view part) {
     return parts.empty() || std::find(parts.begin(), parts.end(), part) != parts.end();

@@ -16,6 +16,12 @@
 
 #include <nlohmann/json.hpp>
 
+#include <cairn/core/check.hpp>
+#include <cairn/io/file.hpp>
+#include <cairn/version.hpp>
+
+#include "../examples/support/standard_output.hpp"
+
 #ifndef CAIRN_BENCH_FLAGS
 #define CAIRN_BENCH_FLAGS "unknown"
 #endif
@@ -107,6 +113,30 @@ std::filesystem::path output_folder() {
 
 }  // namespace
 
+std::optional<int> answer(int argc, char** argv, const std::string& program,
+                          std::initializer_list<std::string_view> parts) {
+  std::string usage = "usage: " + program;
+  for (const std::string_view part : parts) usage.append(" [").append(part).append("]");
+  usage += parts.size() > 0 ? "\nWithout names all parts.\n"
+                            : "\nTakes no options; CAIRN_DATA names the real data.\n";
+  for (int i = 1; i < argc; ++i) {
+    const std::string_view word = argv[i];
+    if (word == "--help" || word == "-h" || word == "--version") {
+      std::cout << (word == "--version" ? program + " " CAIRN_VERSION_STRING "\n" : usage);
+      return flush_standard_output(program) ? 0 : 1;
+    }
+    if (std::ranges::find(parts, word) == parts.end()) {
+      std::cerr << program << ": '" << word << "' is no option\n" << usage;
+      return 2;
+    }
+  }
+  return std::nullopt;
+}
+
+bool flush_standard_output(const std::string& program) {
+  return example::flush_standard_output(program);
+}
+
 std::optional<bool> met(const Row& row) {
   if (!row.measured || (!row.must && !row.aim)) return std::nullopt;
   return reaches(row, row.must ? *row.must : *row.aim);
@@ -174,14 +204,14 @@ int Scoreboard::finish() const {
   const std::filesystem::path file = output_folder() / (area_ + ".json");
   std::error_code ignored;
   std::filesystem::create_directories(file.parent_path(), ignored);
-  std::ofstream out(file);
-  out << document.dump(2) << '\n';
-  if (!out.flush()) {
-    std::cerr << "cannot write " << file.string() << "; is CAIRN_SCOREBOARD_DIR a writable folder?\n";
+  try {
+    cairn::write_file_atomically(file, document.dump(2) + "\n");
+  } catch (const cairn::Error& error) {
+    std::cerr << error.what() << "; is CAIRN_SCOREBOARD_DIR a writable folder?\n";
     return 1;
   }
   std::cout << "\nwritten to " << file.string() << '\n';
-  return 0;
+  return flush_standard_output("scoreboard_" + area_) ? 0 : 1;
 }
 
 }  // namespace cairn_bench

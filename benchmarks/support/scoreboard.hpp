@@ -18,8 +18,10 @@
 /// with "met" true, false, or null where nothing was measured.
 #pragma once
 
+#include <initializer_list>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "support/timing.hpp"
@@ -28,6 +30,14 @@ namespace cairn_bench {
 
 enum class Better { smaller, larger };
 using enum Better;
+
+/// Exit code of a program whose command line asks for --help or --version, or names what is none of `parts`
+/// (2); nothing where it is to run. The parts named are a program's to find.
+std::optional<int> answer(int argc, char** argv, const std::string& program,
+                          std::initializer_list<std::string_view> parts = {});
+
+/// Hands everything printed to whoever reads it; says on standard error where that fails, and returns false.
+bool flush_standard_output(const std::string& program);
 
 /// One line of the table. A row without a measurement carries the reason in `note`: "no data" or "no rival".
 struct Row {
@@ -76,7 +86,7 @@ public:
   [[nodiscard]] const std::vector<Row>& rows() const noexcept { return rows_; }
 
   /// Prints the aligned table and writes the JSON file. Returns the exit code: 0 also when rows are missed (a
-  /// scoreboard reports), 1 when the file cannot be written.
+  /// scoreboard reports), 1 when the file or the table cannot be written.
   [[nodiscard]] int finish() const;
 
 private:

@@ -123,7 +123,10 @@ AcquisitionResult acquire(const cairn::FieldGrid& field, const AcquisitionOption
   result.right_within = 1.5 * spacing;
   result.trials.resize(options.starts);
   cairn::parallel_for(options.starts, options.threads, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) result.trials[i] = trial(cairn::Random(options.seed, i));
+    for (std::size_t i = begin; i < end; ++i) {
+      result.trials[i] = trial(cairn::Random(options.seed, i));
+      if (options.on_start) options.on_start();
+    }
   });
   double right = 0, first = 0, wrong = 0, squares = 0;
   for (const AcquisitionTrial& t : result.trials) {

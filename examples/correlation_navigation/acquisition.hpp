@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <cairn/field/correlation.hpp>
@@ -42,6 +43,8 @@ struct AcquisitionOptions {
   double reckoning = 0.02;      ///< error of dead reckoning along each axis, as a share of the way
   std::uint64_t seed = 1;
   unsigned threads = 1;
+  std::function<void()>
+      on_start{};  ///< called after each start, by any thread; what it throws ends the search
 };
 
 /// Random places, headings, gains and biases over the field. A frame that the search refuses is followed by

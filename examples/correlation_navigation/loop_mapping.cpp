@@ -131,8 +131,7 @@ private:
 std::vector<Seen> fly(const FieldGrid& field, const LoopFlight& flight, double spacing, double noise) {
   const cairn::BsplineMap world(cairn::without_voids(field));
   const Vector<2> centre(0.5 * (field.frame().x0 + field.x_end()), 0.5 * (field.frame().y0 + field.y_end()));
-  const double length = 2.0 * std::numbers::pi * flight.radius;
-  const auto frames = static_cast<std::size_t>(length / (flight.velocity * flight.interval)) + 3;
+  const std::size_t frames = frames_of(flight);
   cairn::Random random(flight.seed, 3);
   DeadReckoning reckoning(flight, random);
   std::vector<Seen> seen;
@@ -159,6 +158,7 @@ std::vector<Seen> fly(const FieldGrid& field, const LoopFlight& flight, double s
          heading,
          samples.value,
          reckoning.state()});
+    if (flight.on_frame) flight.on_frame();
   }
   return seen;
 }
@@ -223,6 +223,11 @@ void compare_placements(const std::vector<Seen>& seen, LoopResult& result) {
 }
 
 }  // namespace
+
+std::size_t frames_of(const LoopFlight& flight) {
+  const double length = 2.0 * std::numbers::pi * flight.radius;
+  return static_cast<std::size_t>(length / (flight.velocity * flight.interval)) + 3;
+}
 
 LoopResult fly_loop(const FieldGrid& field, const LoopFlight& flight) {
   cairn::RunningMoments moments;

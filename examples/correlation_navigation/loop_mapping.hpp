@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -26,7 +27,11 @@ struct LoopFlight {
   double sensor_noise = 0.1;     ///< white, as a share of the field's standard deviation
   std::size_t start_frames = 6;  ///< the first frames, which the return is matched with
   std::uint64_t seed = 1;
+  std::function<void()> on_frame{};  ///< called after each frame; what it throws ends the flight
 };
+
+/// How many frames the circle has, and some beyond it.
+[[nodiscard]] std::size_t frames_of(const LoopFlight& flight);
 
 /// One frame of the loop: where it was, where dead reckoning put it, where the correction puts it.
 struct LoopFrame {

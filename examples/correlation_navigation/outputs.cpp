@@ -6,10 +6,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <iostream>
 #include <limits>
 #include <numbers>
-#include <system_error>
+#include <string>
+#include <vector>
 
 #include <nlohmann/json.hpp>
 
@@ -19,6 +19,7 @@
 
 #include "support/image_io.hpp"
 #include "support/report.hpp"
+#include "support/result_folder.hpp"
 
 namespace correlation_navigation {
 
@@ -108,13 +109,11 @@ void add_straight(example::Report& page, const Results& r) {
   page.add(lost);
 }
 
-void add_acquisition(example::Report& page, const Results& r) {
+void add_acquisition(example::Report& page, const AcquisitionResult& r, const std::string& field) {
   example::PlaneCurve right{"right", Ink::belief, {}, {}, true}, refused{"refused", Ink::grey, {}, {}, true},
       wrong{"accepted, wrong", Ink::wrong, {}, {}, true};
-  for (const AcquisitionTrial& t : r.acquisition.trials) {
-    example::PlaneCurve& curve = !t.fix.accepted()                       ? refused
-                                 : t.error <= r.acquisition.right_within ? right
-                                                                         : wrong;
+  for (const AcquisitionTrial& t : r.trials) {
+    example::PlaneCurve& curve = !t.fix.accepted() ? refused : t.error <= r.right_within ? right : wrong;
     curve.x.push_back(t.truth_x);
     curve.y.push_back(t.truth_y);
   }
@@ -123,17 +122,17 @@ void add_acquisition(example::Report& page, const Results& r) {
       .caption =
           "Each start was known to 2 km only. A frame that could lie at several places is refused, and the "
           "next frame ahead is searched for; a dot marks the last one. At the first frame " +
-          readable(100 * r.acquisition.first_rate) + " % were found. Field: " + r.field,
+          readable(100 * r.first_rate) + " % were found. Field: " + field,
       .x = {"east", "m"},
       .y = {"north", "m"},
       .curves = {right, refused, wrong}});
 }
 
-void add_planar(example::Report& page, const Results& r) {
+void add_planar(example::Report& page, const PlanarResult& r) {
   example::PlaneCurve truth{"truth", Ink::truth, {}, {}, false}, belief{"belief", Ink::belief, {}, {}, true},
       searched{"correlation search", Ink::measurement, {}, {}, true};
   std::vector<double> time, error, three_sigma, blind;
-  for (const PlanarPoint& p : r.planar.points) {
+  for (const PlanarPoint& p : r.points) {
     truth.x.push_back(p.truth_x);
     truth.y.push_back(p.truth_y);
     belief.x.push_back(p.x);
@@ -215,11 +214,11 @@ void add_map_error(example::Report& page, const LoopResult& loop) {
 }
 #endif
 
-void add_loop(example::Report& page, const Results& r) {
+void add_loop(example::Report& page, const LoopResult& r) {
   example::PlaneCurve truth{"truth", Ink::truth, {}, {}, false},
       before{"dead reckoning", Ink::wrong, {}, {}, false}, after{"corrected", Ink::belief, {}, {}, false};
   std::vector<double> time, error_before, error_after, sigma_after;
-  for (const LoopFrame& f : r.loop.frames) {
+  for (const LoopFrame& f : r.frames) {
     truth.x.push_back(f.truth_x);
     truth.y.push_back(f.truth_y);
     before.x.push_back(f.before_x);
@@ -243,8 +242,8 @@ void add_loop(example::Report& page, const Results& r) {
   page.add(example::LinePlot{
       .title = "Where the map's frames lie",
       .caption = "How far each frame of the loop is put from where it was seen. Map against field, rms: " +
-                 readable(r.loop.map_rms_before) + " before, " + readable(r.loop.map_rms_after) +
-                 " after; the field itself varies by " + readable(r.loop.field_deviation) + ".",
+                 readable(r.map_rms_before) + " before, " + readable(r.map_rms_after) +
+                 " after; the field itself varies by " + readable(r.field_deviation) + ".",
       .x = {"time", "s"},
       .y = {"distance from the truth", "m"},
       .x_values = time,
@@ -252,42 +251,58 @@ void add_loop(example::Report& page, const Results& r) {
                  {"corrected", Ink::belief, error_after},
                  {"predicted sigma after", Ink::grey, sigma_after, true}}});
 #ifdef EXAMPLES_HAVE_PNG
-  if (r.loop.field_deviation > 0) add_map_error(page, r.loop);
+  if (r.field_deviation > 0) add_map_error(page, r);
 #endif
 }
 
-std::string errors_csv(const StraightResult& result) {
-  std::string text = "time";
-  for (const StateName& name : state_names)
-    for (const char* kind : {"_rms", "_sigma", "_bound"}) text += std::string(",") + name.symbol + kind;
-  text += ",nees\n";
-  for (std::size_t k = 0; k < result.time.size(); ++k) {
-    cairn::append_number(text, result.time[k]);
-    for (std::size_t i = 0; i < state_names.size(); ++i)
-      for (const auto* series : {&result.rms_error[i], &result.sigma[i], &result.bound[i]}) {
-        text += ',';
-        cairn::append_number(text, (*series)[k]);
-      }
-    text += ',';
-    cairn::append_number(text, result.nees[k]);
-    text += '\n';
-  }
-  return text;
+example::ResultFolder results_in(const std::filesystem::path& folder) {
+  return {folder, {"summary.json", "errors.csv", "timing.json", "report.html"}};
 }
 
 }  // namespace
 
+std::string errors_csv(const StraightResult& result) {
+  std::vector<std::string> names{"time"};
+  std::vector<const std::vector<double>*> columns{&result.time};
+  for (std::size_t i = 0; i < state_names.size(); ++i) {
+    for (const char* kind : {"_rms", "_sigma", "_bound"})
+      names.push_back(std::string(state_names[i].symbol) + kind);
+    for (const auto* of : {&result.rms_error[i], &result.sigma[i], &result.bound[i]}) columns.push_back(of);
+  }
+  names.emplace_back("nees");
+  columns.push_back(&result.nees);
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ",") + name;
+  text += '\n';
+  for (std::size_t k = 0; k < result.time.size(); ++k)
+    for (std::size_t column = 0; column < columns.size(); ++column) {
+      const double value = (*columns[column])[k];
+      if (!std::isfinite(value))
+        cairn::raise("errors.csv: not written, " + names[column] + " of row " + std::to_string(k + 1) +
+                     " is not finite");
+      cairn::append_number(text, value);
+      text += column + 1 < columns.size() ? ',' : '\n';
+    }
+  return text;
+}
+
 std::string summary(const Results& r) {
-  nlohmann::ordered_json json;
+  using Json = nlohmann::ordered_json;
+  // A figure of an experiment, null where that was not made or had nothing to measure.
+  const auto figure = [](const auto& result, bool measured, auto member) {
+    return result && measured ? Json((*result).*member) : Json(nullptr);
+  };
+  const bool any_acquired = r.acquisition && r.acquisition->rate > 0;
+  Json json;
   json["field"] = r.field;
   json["notes"] = r.notes;
   json["seed"] = r.seed;
   json["runs"] = r.runs;
-  json["seconds"] = r.seconds;
-  json["acquisition_rate"] = r.acquisition.rate;
-  json["acquisition_first_frame_rate"] = r.acquisition.first_rate;
-  json["acquisition_wrong_rate"] = r.acquisition.wrong_rate;
-  json["acquisition_rms_error_m"] = r.acquisition.rms_error;
+  json["ended_early"] = r.ended_early ? Json(*r.ended_early) : Json(nullptr);
+  json["acquisition_rate"] = figure(r.acquisition, true, &AcquisitionResult::rate);
+  json["acquisition_first_frame_rate"] = figure(r.acquisition, true, &AcquisitionResult::first_rate);
+  json["acquisition_wrong_rate"] = figure(r.acquisition, true, &AcquisitionResult::wrong_rate);
+  json["acquisition_rms_error_m"] = figure(r.acquisition, any_acquired, &AcquisitionResult::rms_error);
   json["rms_position_error_m"] = r.straight.rms_position_error;
   json["max_position_error_m"] = r.straight.max_position_error;
   json["rmse_over_crb"] = r.straight.rmse_over_bound;
@@ -304,19 +319,35 @@ std::string summary(const Results& r) {
     json["error_budget"].push_back({{"sensor_noise", row.sensor_noise},
                                     {"map_error", row.map_error},
                                     {"final_position_sigma_m", row.final_sigma}});
-  json["planar"] = {{"rms_position_error_m", r.planar.rms_error},
-                    {"max_position_error_m", r.planar.max_error},
-                    {"frames", r.planar.points.size()},
-                    {"frames_tracked", r.planar.frames_tracked},
-                    {"searches", r.planar.searches},
-                    {"reacquired", r.planar.reacquired}};
-  json["loop"] = {{"closed", r.loop.closed},
-                  {"closing_error_m", r.loop.closing_error},
-                  {"placement_rms_before_m", r.loop.placement_rms_before},
-                  {"placement_rms_after_m", r.loop.placement_rms_after},
-                  {"map_rms_before", r.loop.map_rms_before},
-                  {"map_rms_after", r.loop.map_rms_after},
-                  {"field_deviation", r.loop.field_deviation}};
+  json["planar"] = nullptr;
+  if (r.planar) {
+    const bool tracked = r.planar->frames_tracked > 0;
+    json["planar"] = {{"rms_position_error_m", figure(r.planar, tracked, &PlanarResult::rms_error)},
+                      {"max_position_error_m", figure(r.planar, tracked, &PlanarResult::max_error)},
+                      {"frames", r.planar->points.size()},
+                      {"frames_tracked", r.planar->frames_tracked},
+                      {"searches", r.planar->searches},
+                      {"reacquired", r.planar->reacquired}};
+  }
+  json["loop"] = nullptr;
+  if (r.loop)
+    json["loop"] = {{"closed", r.loop->closed},
+                    {"closing_error_m", figure(r.loop, r.loop->closed, &LoopResult::closing_error)},
+                    {"placement_rms_before_m", r.loop->placement_rms_before},
+                    {"placement_rms_after_m", r.loop->placement_rms_after},
+                    {"map_rms_before", r.loop->map_rms_before},
+                    {"map_rms_after", r.loop->map_rms_after},
+                    {"field_deviation", r.loop->field_deviation}};
+  return json.dump(2) + "\n";
+}
+
+std::string timing(const Results& r) {
+  nlohmann::ordered_json json;
+  double sum = 0;
+  for (const auto& [name, seconds] : r.seconds) sum += seconds;
+  json["threads"] = r.threads;
+  json["seconds"] = sum;
+  for (const auto& [name, seconds] : r.seconds) json["experiment_seconds"][name] = seconds;
   return json.dump(2) + "\n";
 }
 
@@ -332,42 +363,43 @@ std::optional<std::string> report(const Results& r) {
   page.figure({"NEES, 5 states", readable(r.straight.nees_mean), "",
                "band " + readable(r.straight.nees_band.low) + " to " + readable(r.straight.nees_band.high),
                judged(r.straight.nees_band.contains(r.straight.nees_mean))});
-  page.figure({"Acquired within 2 km", readable(100 * r.acquisition.rate), "%",
-               "at the first frame " + readable(100 * r.acquisition.first_rate) + " %; wrong " +
-                   readable(100 * r.acquisition.wrong_rate) + " %",
-               judged(r.acquisition.rate >= 0.95 && r.acquisition.wrong_rate == 0)});
-  page.figure({"Flight with turns, rms error", readable(r.planar.rms_error), "m",
-               "frames tracked: " + std::to_string(r.planar.frames_tracked), judged(r.planar.reacquired)});
-  page.figure({"Map error before", readable(r.loop.map_rms_before), "", "rms against the field"});
-  page.figure({"Map error after the loop", readable(r.loop.map_rms_after), "", "rms against the field",
-               judged(r.loop.map_rms_after < r.loop.map_rms_before)});
+  if (r.acquisition)
+    page.figure({"Acquired within 2 km", readable(100 * r.acquisition->rate), "%",
+                 "at the first frame " + readable(100 * r.acquisition->first_rate) + " %; wrong " +
+                     readable(100 * r.acquisition->wrong_rate) + " %",
+                 judged(r.acquisition->rate >= 0.95 && r.acquisition->wrong_rate == 0)});
+  if (r.planar)
+    page.figure({"Flight with turns, rms error",
+                 r.planar->frames_tracked > 0 ? readable(r.planar->rms_error) : "none", "m",
+                 "frames tracked: " + std::to_string(r.planar->frames_tracked),
+                 judged(r.planar->reacquired)});
+  if (r.loop) {
+    page.figure({"Map error before", readable(r.loop->map_rms_before), "", "rms against the field"});
+    page.figure({"Map error after the loop", readable(r.loop->map_rms_after), "", "rms against the field",
+                 judged(r.loop->map_rms_after < r.loop->map_rms_before)});
+  }
+  if (r.ended_early) page.note(*r.ended_early);
   for (const std::string& note : r.notes) page.note(note);
   add_straight(page, r);
-  if (!r.acquisition.trials.empty()) add_acquisition(page, r);
-  if (!r.planar.points.empty()) add_planar(page, r);
-  if (!r.loop.frames.empty()) add_loop(page, r);
+  if (r.acquisition) add_acquisition(page, *r.acquisition, r.field);
+  if (r.planar) add_planar(page, *r.planar);
+  if (r.loop) add_loop(page, *r.loop);
   return page.html();
 }
 
 void prepare_folder(const std::filesystem::path& folder) {
-  std::error_code failure;
-  std::filesystem::create_directories(folder, failure);
-  if (failure)
-    cairn::raise(folder.string() + ": cannot make this folder (" + failure.message() +
-                 "); expected a writable place");
-  const std::filesystem::path probe = folder / "write_probe";
-  cairn::write_file_atomically(probe, "");
-  std::filesystem::remove(probe, failure);
+  results_in(folder).prepare();
 }
 
-void write_outputs(const Results& results, const std::filesystem::path& folder) {
-  prepare_folder(folder);
-  cairn::write_file_atomically(folder / "summary.json", summary(results));
-  cairn::write_file_atomically(folder / "errors.csv", errors_csv(results.straight));
-  if (const std::optional<std::string> page = report(results))
-    cairn::write_file_atomically(folder / "report.html", *page);
-  else
-    std::clog << example::why_no_report() << '\n';
+std::optional<std::string> write_outputs(const Results& results, const std::filesystem::path& folder) {
+  const std::optional<std::string> page = report(results);
+  results_in(folder).replace([&](const std::filesystem::path& staging) {
+    cairn::write_file_atomically(staging / "summary.json", summary(results));
+    cairn::write_file_atomically(staging / "errors.csv", errors_csv(results.straight));
+    cairn::write_file_atomically(staging / "timing.json", timing(results));
+    if (page) cairn::write_file_atomically(staging / "report.html", *page);
+  });
+  return page ? std::nullopt : std::optional(example::why_no_report());
 }
 
 }  // namespace correlation_navigation

@@ -161,6 +161,7 @@ PlanarResult fly_planar(const cairn::FieldGrid& field, const PlanarFlight& fligh
       result.reacquired = result.reacquired || k >= flight.blind_until;
     }
     result.points.push_back(point);
+    if (flight.on_frame) flight.on_frame();
   }
   if (result.frames_tracked > 0)
     result.rms_error = std::sqrt(squares / static_cast<double>(result.frames_tracked));

@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <cairn/field/grid.hpp>
@@ -29,6 +30,7 @@ struct PlanarFlight {
   std::size_t blind_until = 110;
   double gust_x = 9, gust_y = -6;  ///< [m/s]
   std::uint64_t seed = 1;
+  std::function<void()> on_frame{};  ///< called after each frame; what it throws ends the flight
 };
 
 struct PlanarPoint {

@@ -3,6 +3,7 @@
 #include "straight_flight.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
@@ -176,8 +177,10 @@ StraightResult fly_straight(const StraightFlight& flight, std::size_t runs) {
   const cairn::PatchNoise noise = noise_of(flight);
   std::vector<Run> all(runs);
   cairn::parallel_for(runs, flight.threads, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t run = begin; run < end; ++run)
+    for (std::size_t run = begin; run < end; ++run) {
       all[run] = fly_once(flight, noise, cairn::Random(flight.seed, run));
+      if (flight.on_run) flight.on_run();
+    }
   });
   StraightResult result;
   const auto frames = static_cast<std::size_t>(flight.frames);
@@ -202,12 +205,14 @@ StraightResult fly_straight(const StraightFlight& flight, std::size_t runs) {
 
 std::vector<BudgetRow> error_budget(const StraightFlight& flight) {
   std::vector<BudgetRow> rows;
-  for (const double sensor : {0.05, 0.1, 0.2})
-    for (const double map : {0.0, 0.05, 0.1, 0.2}) {
+  constexpr std::array sensors{0.05, 0.1, 0.2};
+  constexpr std::array maps{0.0, 0.05, 0.1, 0.2};
+  for (const double sensor : sensors)
+    for (const double map : maps) {
       StraightFlight variant = flight;
       variant.sensor_noise = sensor;
       variant.map_error = map;
-      const StraightResult result = fly_straight(variant, 6);
+      const StraightResult result = fly_straight(variant, runs_of_budget / (sensors.size() * maps.size()));
       rows.push_back({sensor, map, result.bound[0].back()});
     }
   return rows;
@@ -216,15 +221,18 @@ std::vector<BudgetRow> error_budget(const StraightFlight& flight) {
 std::vector<DivergenceRow> divergence(const StraightFlight& flight, std::size_t runs) {
   std::vector<DivergenceRow> rows;
   const double length = 1.0 / flight.field.alpha;
-  for (const double start : {0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0}) {
+  constexpr std::array<double, starts_of_divergence> starts{0.1, 0.25, 0.5, 0.75, 1.0, 1.5, 2.0};
+  for (const double start : starts) {
     StraightFlight variant = flight;
     variant.frames = 5;
     variant.sigma[0] = start * length;
     const cairn::PatchNoise noise = noise_of(variant);
     std::vector<std::array<bool, 3>> lost(runs);
     cairn::parallel_for(runs, flight.threads, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t run = begin; run < end; ++run)
+      for (std::size_t run = begin; run < end; ++run) {
         lost[run] = fly_from_afar(variant, noise, cairn::Random(flight.seed + 7, run));
+        if (flight.on_run) flight.on_run();
+      }
     });
     DivergenceRow row{start};
     for (const std::array<bool, 3>& run : lost) {

@@ -9,6 +9,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <cairn/core/statistics.hpp>
@@ -32,6 +33,7 @@ struct StraightFlight {
   std::array<double, 5> sigma{60.0, 3.0, 0.6, 0.6, 0.02};  ///< of x, V, L_x, L_y, psi at the start
   std::uint64_t seed = 1;
   unsigned threads = 1;
+  std::function<void()> on_run{};  ///< called after each run, by any thread; what it throws ends the flight
 };
 
 /// Statistics over the runs, at each frame.
@@ -56,6 +58,7 @@ struct StraightResult {
 struct BudgetRow {
   double sensor_noise, map_error, final_sigma;
 };
+inline constexpr std::size_t runs_of_budget = 12 * 6;
 [[nodiscard]] std::vector<BudgetRow> error_budget(const StraightFlight& flight);
 
 /// How often a filter that starts `start` correlation lengths (1 / alpha) off is still lost (more than 5 of
@@ -66,6 +69,7 @@ struct DivergenceRow {
   double iterated = 0;  ///< by the iterated filter
   double searched = 0;  ///< by the iterated filter after a correlation search over the uncertainty
 };
+inline constexpr std::size_t starts_of_divergence = 7;
 [[nodiscard]] std::vector<DivergenceRow> divergence(const StraightFlight& flight, std::size_t runs);
 
 }  // namespace correlation_navigation

@@ -14,13 +14,13 @@ namespace correlation_navigation {
 /// The terrain of a file as a grid in metres, x to the east and y to the north, the south-west corner at (0,
 /// 0).
 ///
-///   .tif, .tiff  uncompressed GeoTIFF, strips or tiles, of 8, 16 or 32-bit integers or 32 or 64-bit floats;
-///                the model's pixel scale in metres (a projected system) and GDAL's no-data value are used
+///   .tif, .tiff  GeoTIFF, where the program was built with libtiff (geotiff.hpp)
 ///   .hgt         SRTM: 1201 or 3601 squared big-endian 16-bit heights, -32768 void, about 90 or 30 m apart;
 ///                the name (N34W118.hgt) gives the latitude that shortens the east-west spacing
-///   .pgm         grey values, `pgm_spacing` metres apart
+///   .pgm         grey values
+/// A .pgm, and a .tif that does not say it, has its heights `spacing` metres apart.
 /// Throws cairn::Error naming the file and what was expected: another format, a truncated file, no valid
 /// height.
-[[nodiscard]] cairn::FieldGrid read_terrain(const std::filesystem::path& path, double pgm_spacing = 30.0);
+[[nodiscard]] cairn::FieldGrid read_terrain(const std::filesystem::path& path, double spacing = 30.0);
 
 }  // namespace correlation_navigation

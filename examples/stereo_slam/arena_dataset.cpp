@@ -15,6 +15,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/random.hpp>
+#include <cairn/io/text.hpp>
 
 #include "arena_cache.hpp"
 #include "arena_renderer.hpp"
@@ -27,7 +28,7 @@ constexpr double degree = std::numbers::pi / 180;
 constexpr double frames_a_second = 10;
 
 void check(bool good, const char* what, double found) {
-  if (!good) cairn::raise("arena: expected " + std::string(what) + ", found " + std::to_string(found));
+  if (!good) cairn::raise("arena: expected " + std::string(what) + ", found " + cairn::shortest(found));
 }
 
 void check(const ArenaOptions& o) {

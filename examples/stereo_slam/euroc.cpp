@@ -37,7 +37,10 @@ public:
   [[nodiscard]] std::vector<double> list(const std::string& key, std::size_t least, std::size_t most) const {
     const std::string expected =
         "'" + key + "' with a list of " + std::to_string(least) + " finite numbers in brackets";
-    const std::size_t open = text_.find('[', place_of(key, expected));
+    const std::size_t after = place_of(key, expected) + key.size() + 1;
+    const std::size_t open = text_.find('[', after);
+    if (open == std::string::npos || !leads_to_list(std::string_view(text_).substr(after, open - after)))
+      refuse(expected);
     const std::size_t close = text_.find(']', open);
     if (close == std::string::npos) refuse(expected);
     std::vector<double> numbers;
@@ -64,11 +67,25 @@ public:
 
 private:
   [[nodiscard]] std::size_t place_of(const std::string& key, const std::string& expected) const {
-    const std::string head = key + ":";  // lines are trimmed, so a key starts its line
-    if (text_.compare(0, head.size(), head) == 0) return 0;
-    const std::size_t found = text_.find("\n" + head);
+    const std::string head = "\n" + key + ":";  // lines are trimmed, so a key starts its line
+    const std::size_t found = text_.find(head);
     if (found == std::string::npos) cairn::raise(name_ + ": lacks the key " + key + "; expected " + expected);
+    if (text_.find(head, found + 1) != std::string::npos) refuse("the key " + key + " once");
     return found + 1;
+  }
+
+  // Between a key and its list there may be what OpenCV says of a matrix, and no other key.
+  static bool leads_to_list(std::string_view between) {
+    while (!between.empty()) {
+      const std::size_t end = std::min(between.find('\n'), between.size());
+      const std::string_view line = without_ends(between.substr(0, end));
+      const auto begins = [&](std::string_view word) { return line.starts_with(word); };
+      if (!line.empty() && !begins("cols:") && !begins("rows:") && !begins("dt:") && !begins("data:") &&
+          !begins("!!"))
+        return false;
+      between.remove_prefix(std::min(end + 1, between.size()));
+    }
+    return true;
   }
 
   static std::string_view without_ends(std::string_view text) {
@@ -79,7 +96,7 @@ private:
   }
 
   std::string name_;
-  std::string text_;
+  std::string text_ = "\n";
 };
 
 struct EurocCamera {
@@ -119,7 +136,7 @@ EurocCamera read_camera(const Path& file) {
   }
 }
 
-// data.csv: nanoseconds, file name.
+// data.csv: nanoseconds, file name; lines in any order, since images are paired by their times.
 std::map<Nanoseconds, Path> read_images(const Path& folder) {
   const Path file = folder / "data.csv";
   cairn::TextLines lines(file, "the list of images of a EuRoC camera");
@@ -129,7 +146,9 @@ std::map<Nanoseconds, Path> read_images(const Path& folder) {
     const std::optional<Nanoseconds> time =
         cairn::parse_number<Nanoseconds>(cairn::trimmed(lines.line().substr(0, comma)));
     if (!time || comma == std::string_view::npos) lines.fail("nanoseconds,file name");
-    images[*time] = folder / "data" / std::string(cairn::trimmed(lines.line().substr(comma + 1)));
+    const std::string name(cairn::trimmed(lines.line().substr(comma + 1)));
+    if (name.empty()) lines.fail("nanoseconds,file name");
+    if (!images.emplace(*time, folder / "data" / name).second) lines.fail("one image a time");
   }
   if (images.empty()) lines.fail("at least one line nanoseconds,file name");
   return images;

@@ -55,7 +55,7 @@ cairn::StereoRig rectified_rig(const Path& file) {
   if (!(baseline > 0))
     cairn::raise(file.string() +
                  ": expected the second camera to the right of the first, found a baseline of " +
-                 std::to_string(baseline) + " m");
+                 cairn::shortest(baseline) + " m");
   rig.T_left_right = {{}, {baseline, 0, 0}};
   return rig;
 }
@@ -67,9 +67,12 @@ std::vector<double> read_times(const Path& file, std::size_t frames) {
     return times;
   }
   cairn::TextLines lines(file, "the times of a KITTI sequence");
-  for (double& time : times)
-    if (!lines.next() || lines.numbers(' ', &time, 1) != 1)
+  for (std::size_t i = 0; i < frames; ++i) {
+    if (!lines.next() || lines.numbers(' ', &times[i], 1) != 1)
       lines.fail("one time for each of the " + std::to_string(frames) + " frames");
+    if (i > 0 && times[i] < times[i - 1]) lines.fail("times that do not run backwards");
+  }
+  if (lines.next()) lines.fail("no more than " + std::to_string(frames) + " times, one a frame");
   return times;
 }
 

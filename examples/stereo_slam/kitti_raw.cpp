@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -61,18 +62,24 @@ cairn::PinholeCamera raw_camera(const KeyedNumbers& calibration, const Path& fil
   return cairn::PinholeCamera(p);
 }
 
-cairn::StereoRig raw_rig(const KeyedNumbers& calibration, const Path& file) {
-  cairn::StereoRig rig;
+// What `make` makes of a file; where it throws, what it says is said of the file.
+template <class Make>
+auto made_of(const Path& file, const Make& make) {
   try {
-    rig.left = raw_camera(calibration, file, "00");
-    rig.right = raw_camera(calibration, file, "01");
-    rig.T_left_right = camera_from_first(calibration, "00") * camera_from_first(calibration, "01").inverse();
+    return make();
   } catch (const cairn::Error& error) {
     const std::string message = error.what();
     if (message.find(file.string()) != std::string::npos) throw;
     cairn::raise(file.string() + ": " + message);
   }
-  return rig;
+}
+
+cairn::StereoRig raw_rig(const KeyedNumbers& calibration, const Path& file) {
+  return made_of(file, [&] {
+    return cairn::StereoRig{
+        raw_camera(calibration, file, "00"), raw_camera(calibration, file, "01"),
+        camera_from_first(calibration, "00") * camera_from_first(calibration, "01").inverse()};
+  });
 }
 
 std::map<std::size_t, Path> numbered_images(const Path& folder, const std::string& expected) {
@@ -80,31 +87,42 @@ std::map<std::size_t, Path> numbered_images(const Path& folder, const std::strin
   for (const Path& file : image_files(folder, expected)) {
     const std::optional<std::size_t> number = number_of(file);
     if (!number) cairn::raise(file.string() + ": the name is no number; expected names like 0000000012.png");
-    images[*number] = file;
+    const auto [other, fresh] = images.emplace(*number, file);
+    if (!fresh)
+      cairn::raise(file.string() + ": has the number of " + other->second.filename().string() +
+                   "; expected one image a number");
   }
   return images;
 }
 
-// "2011-09-26 14:05:35.500923136" in seconds since 1970.
+// "2011-09-26 14:05:35.500923136" in seconds since 1970; the fraction may be absent, nothing else may differ.
 std::optional<double> seconds_of(std::string_view text) {
+  constexpr std::string_view form = "dddd-dd-dd dd:dd:dd";
+  const auto is_digit = [](char letter) { return letter >= '0' && letter <= '9'; };
+  if (text.size() < form.size()) return std::nullopt;
+  for (std::size_t i = 0; i < form.size(); ++i)
+    if (form[i] == 'd' ? !is_digit(text[i]) : text[i] != form[i]) return std::nullopt;
+  const std::string_view fraction = text.substr(form.size());
+  if (!fraction.empty() && (fraction.size() < 2 || fraction[0] != '.' ||
+                            !std::all_of(fraction.begin() + 1, fraction.end(), is_digit)))
+    return std::nullopt;
   const auto part = [&](std::size_t from, std::size_t count) {
-    return from + count <= text.size() ? cairn::parse_number<int>(text.substr(from, count)) : std::nullopt;
+    return *cairn::parse_number<int>(text.substr(from, count));
   };
-  const auto year = part(0, 4), month = part(5, 2), day = part(8, 2), hour = part(11, 2),
-             minute = part(14, 2);
-  const auto second = text.size() > 17 ? cairn::parse_number(text.substr(17)) : std::nullopt;
-  if (!year || !month || !day || !hour || !minute || !second) return std::nullopt;
-  const std::chrono::year_month_day date{std::chrono::year(*year),
-                                         std::chrono::month(static_cast<unsigned>(*month)),
-                                         std::chrono::day(static_cast<unsigned>(*day))};
+  const int hour = part(11, 2), minute = part(14, 2);
+  const std::optional<double> second = cairn::parse_number(text.substr(17));
+  if (hour > 23 || minute > 59 || !second || !(*second < 60)) return std::nullopt;
+  const std::chrono::year_month_day date{std::chrono::year(part(0, 4)),
+                                         std::chrono::month(static_cast<unsigned>(part(5, 2))),
+                                         std::chrono::day(static_cast<unsigned>(part(8, 2)))};
   if (!date.ok()) return std::nullopt;
   const auto days = std::chrono::sys_days(date).time_since_epoch().count();
-  return 86400.0 * static_cast<double>(days) + 3600.0 * *hour + 60.0 * *minute + *second;
+  return 86400.0 * static_cast<double>(days) + 3600.0 * hour + 60.0 * minute + *second;
 }
 
 // Line n (from 0) is the time of frame n, also where its image is missing; 10 Hz where there is no file.
 void add_times(const Path& file, Recording& recording) {
-  const std::size_t needed = recording.frames.back().index + 1;
+  const std::size_t last = recording.frames.back().index;
   for (RecordedFrame& frame : recording.frames) frame.time = 0.1 * static_cast<double>(frame.index);
   if (!is_file(file)) return;
   std::vector<double> times;
@@ -112,19 +130,23 @@ void add_times(const Path& file, Recording& recording) {
   while (lines.next()) {
     const std::optional<double> time = seconds_of(lines.line());
     if (!time) lines.fail("a time like 2011-09-26 14:05:35.500923136");
+    if (!times.empty() && *time < times.back()) lines.fail("times that do not run backwards");
     times.push_back(*time);
   }
-  if (times.size() < needed)
-    cairn::raise(file.string() + ": holds " + std::to_string(times.size()) + " times; expected at least " +
-                 std::to_string(needed) + ", one for each frame up to the last");
+  if (times.size() <= last)
+    cairn::raise(file.string() + ": holds " + std::to_string(times.size()) +
+                 " times; expected one for each frame up to the last, " + std::to_string(last));
   for (RecordedFrame& frame : recording.frames) frame.time = times[frame.index];
 }
 
 // Poses of the rectified camera 0; x_rectified = R_rect_00 x_0.
-void add_truth(const Path& file, const KeyedNumbers& calibration, Recording& recording) {
+void add_truth(const Path& file, const KeyedNumbers& calibration, const Path& calibration_of,
+               Recording& recording) {
   if (!is_file(file)) return;
-  const cairn::SE3 T_rectified_0(cairn::SO3::from_matrix(rotation_of(calibration.at("R_rect_00", 9))),
-                                 cairn::Vector<3>::Zero());
+  const cairn::SE3 T_rectified_0(
+      made_of(calibration_of,
+              [&] { return cairn::SO3::from_matrix(rotation_of(calibration.at("R_rect_00", 9))); }),
+      cairn::Vector<3>::Zero());
   const cairn::SE3 T_rectified_left = T_rectified_0 * camera_from_first(calibration, "00").inverse();
   std::map<std::size_t, cairn::SE3> poses;
   cairn::TextLines lines(file, "poses of camera 0: frame number and 3 x 4 numbers a line");
@@ -134,8 +156,10 @@ void add_truth(const Path& file, const KeyedNumbers& calibration, Recording& rec
       lines.fail("13 numbers: the frame and a 3 x 4 pose");
     cairn::Matrix<4> pose = cairn::Matrix<4>::Identity();
     for (int i = 0; i < 12; ++i) pose(i / 4, i % 4) = row[i + 1];
+    const auto frame = static_cast<std::size_t>(row[0]);
+    if (poses.contains(frame)) lines.fail("one pose a frame, not a second of " + std::to_string(frame));
     try {
-      poses[static_cast<std::size_t>(row[0])] = cairn::SE3::from_matrix(pose);
+      poses[frame] = cairn::SE3::from_matrix(pose);
     } catch (const cairn::Error& error) {
       lines.fail(std::string("a pose (") + error.what() + ")");
     }
@@ -182,7 +206,7 @@ Recording read_kitti_raw(const Path& folder) {
   if (recording.frames.empty())
     cairn::raise(folder.string() + ": no image of image_00 has a partner in image_01; expected equal names");
   add_times(folder / "image_00" / "timestamps.txt", recording);
-  add_truth(folder / "poses_cam0_rectified.txt", calibration, recording);
+  add_truth(folder / "poses_cam0_rectified.txt", calibration, file, recording);
   return recording;
 }
 

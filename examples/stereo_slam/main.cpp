@@ -3,6 +3,9 @@
 //
 /// @file
 /// stereo_slam: runs the stereo landmark SLAM system on a rendered arena or a recorded drive.
+///
+/// Exit codes: 0 all frames; 2 a mistake, or nothing could be done; 3 a frame could not be read, and 4
+/// interrupted: the results are of the frames before.
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -22,7 +25,10 @@
 #include "outputs.hpp"
 #include "pipeline.hpp"
 #include "summary.hpp"
+#include "support/command_line.hpp"
+#include "support/interruption.hpp"
 #include "support/progress.hpp"
+#include "support/standard_output.hpp"
 
 namespace {
 
@@ -45,21 +51,21 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
       ->default_str("arena");
   app.add_option("--out", arguments.out, "folder for the results")->type_name("DIR")->capture_default_str();
   app.add_option("--frames", arguments.dataset.frames, "stop after so many frames; 0 = all")
-      ->check(CLI::NonNegativeNumber)
+      ->check(example::whole_number(0))
       ->capture_default_str();
   app.add_option("--seed", arguments.pipeline.seed,
                  "of the arena and of all random draws; same seed, same bytes")
-      ->check(CLI::NonNegativeNumber)
+      ->check(example::whole_number(0))
       ->capture_default_str();
   app.add_option("--threads", arguments.pipeline.threads, "threads; the results do not depend on it")
-      ->check(CLI::Range(1U, 1024U))
+      ->check(example::whole_number(1, 1024))
       ->capture_default_str();
   app.add_option("--store", arguments.store,
                  "landmark store: multi (a forest of kd-trees) or single (one, rebuilt)")
       ->check(CLI::IsMember({"multi", "single"}))
       ->capture_default_str();
   app.add_option("--points", arguments.pipeline.points, "interest points to keep in an image")
-      ->check(CLI::Range(50, 20000))
+      ->check(example::whole_number(50, 20000))
       ->capture_default_str();
   app.add_flag("--oriented", arguments.pipeline.oriented,
                "oriented SURF, for cameras that roll (default: upright)");
@@ -76,15 +82,25 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
       ->capture_default_str();
   app.add_option("--drift", arguments.dataset.arena.drift,
                  "arena: the right camera turns by so many degrees in 100 frames, unknown to the system")
+      ->check(example::number_between(-5, 5))
       ->capture_default_str();
   app.add_flag("!--no-cache", arguments.dataset.arena.cache, "arena: do not keep rendered images on disk");
   app.add_option("--dump", arguments.dump, "write the frames as a KITTI odometry sequence into DIR and stop")
       ->type_name("DIR");
 }
 
-/// Runs the system over the data set; the next frame is loaded while this one is worked on.
-stereo_slam::RunRecord run(const stereo_slam::Dataset& dataset, const Arguments& arguments) {
+/// What a run left, and with which exit code the program is to say so.
+struct Run {
+  stereo_slam::RunRecord record;
+  int code = example::exit_well;
+};
+
+/// Runs the system over the data set; the next frame is loaded while this one is worked on. A frame that
+/// cannot be read and an interruption end the run early, with what there is until then; throws where that is
+/// nothing.
+Run run(const stereo_slam::Dataset& dataset, const Arguments& arguments) {
   using Clock = std::chrono::steady_clock;
+  Run result;
   stereo_slam::Pipeline pipeline(dataset.rig(), arguments.pipeline);
   example::Progress progress(std::cerr, "frames", dataset.size());
   const Clock::time_point start = Clock::now();
@@ -94,37 +110,53 @@ stereo_slam::RunRecord run(const stereo_slam::Dataset& dataset, const Arguments&
     return std::pair{std::move(frame),
                      std::chrono::duration<double, std::milli>(Clock::now() - begin).count()};
   };
-  auto next = std::async(std::launch::deferred, load, std::size_t{0});
-  for (std::size_t i = 0; i < dataset.size(); ++i) {
-    auto [frame, load_milliseconds] = next.get();
-    const auto policy = arguments.pipeline.threads > 1 ? std::launch::async : std::launch::deferred;
-    if (i + 1 < dataset.size()) next = std::async(policy, load, i + 1);
-    const stereo_slam::FrameRecord& result = pipeline.step(frame, load_milliseconds);
-    progress.step(result.tracked
-                      ? std::to_string(result.inliers) + " of " + std::to_string(result.stereo_matches) +
-                            " points agree, " + std::to_string(result.landmarks) + " landmarks"
-                      : "lost");
+  std::string why;
+  const example::Interruption interruption;
+  try {
+    auto next = std::async(std::launch::deferred, load, std::size_t{0});
+    for (std::size_t i = 0; i < dataset.size(); ++i) {
+      if (const auto signal = interruption.caught()) {
+        why = "interrupted (" + *signal + ")";
+        result.code = example::exit_interrupted;
+        break;
+      }
+      auto [frame, load_milliseconds] = next.get();
+      const auto policy = arguments.pipeline.threads > 1 ? std::launch::async : std::launch::deferred;
+      if (i + 1 < dataset.size()) next = std::async(policy, load, i + 1);
+      const stereo_slam::FrameRecord& done = pipeline.step(frame, load_milliseconds);
+      progress.step(done.tracked
+                        ? std::to_string(done.inliers) + " of " + std::to_string(done.stereo_matches) +
+                              " points agree, " + std::to_string(done.landmarks) + " landmarks"
+                        : "lost");
+    }
+  } catch (const std::exception& error) {
+    if (progress.done() == 0) throw;
+    why = error.what();
+    result.code = example::exit_data_ended;
   }
-  stereo_slam::RunRecord record = pipeline.record();
+  stereo_slam::RunRecord& record = result.record = pipeline.record();
+  if (!why.empty())
+    record.ended_early = "ended after " + std::to_string(record.frames.size()) + " of " +
+                         std::to_string(dataset.size()) + " frames: " + why;
   record.seconds = std::chrono::duration<double>(Clock::now() - start).count();
   record.dataset = dataset.name();
   const std::vector<std::string> notes = dataset.notes();
   record.notes.insert(record.notes.begin(), notes.begin(), notes.end());
-  return record;
+  return result;
 }
 
 /// The run in a few lines; summary.json has everything.
 void print_summary(const stereo_slam::RunRecord& record) {
   const stereo_slam::Summary summary = stereo_slam::summarise(record);
+  const stereo_slam::Timing timing = stereo_slam::timing(record);
   for (const std::string& note : record.notes) std::cout << "note: " << note << '\n';
   std::printf("%s: %zu frames, %zu lost, %.1f s, %.1f frames a second, %zu landmarks\n",
-              record.dataset.c_str(), summary.frames, summary.frames_lost, summary.seconds, summary.hz,
+              record.dataset.c_str(), summary.frames, summary.frames_lost, timing.seconds, timing.hz,
               summary.landmarks);
   if (!summary.errors) return;
   std::printf("path %.2f m, error at the end %.3f m, largest %.3f m and %.2f degrees\n", summary.path,
               summary.errors->end, summary.errors->largest.position,
               summary.errors->largest.heading * stereo_slam::degrees);
-  std::fflush(stdout);
 }
 
 }  // namespace
@@ -137,11 +169,7 @@ int main(int argc, char** argv) {
   arguments.pipeline.threads = std::max(1U, std::thread::hardware_concurrency());
   std::vector<std::string> dataset{"arena"};
   define(app, arguments, dataset);
-  try {
-    app.parse(argc, argv);
-  } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
-  }
+  if (const std::optional<int> code = example::parse(app, "stereo_slam", argc, argv)) return *code;
   try {
     arguments.dataset.kind = dataset.front();
     if (dataset.size() > 1) arguments.dataset.folder = dataset[1];
@@ -159,14 +187,16 @@ int main(int argc, char** argv) {
     }
     stereo_slam::prepare_output_folder(arguments.out);
     arguments.pipeline.sample_frame = frames->size() / 2;
-    const stereo_slam::RunRecord record = run(*frames, arguments);
-    const std::optional<std::string> no_report = stereo_slam::write_outputs(record, arguments.out);
-    print_summary(record);
+    const Run done = run(*frames, arguments);
+    if (done.record.ended_early) std::cerr << "stereo_slam: " << *done.record.ended_early << '\n';
+    if (done.record.frames.empty()) return done.code;  // the results of an earlier run stay
+    const std::optional<std::string> no_report = stereo_slam::write_outputs(done.record, arguments.out);
+    print_summary(done.record);
     if (no_report) std::cout << "no report.html: " << *no_report << '\n';
     std::cout << "results: " << arguments.out.string() << '\n';
-    return 0;
+    return example::flush_standard_output("stereo_slam") ? done.code : example::exit_mistake;
   } catch (const std::exception& error) {
     std::cerr << "stereo_slam: " << error.what() << '\n';
-    return 2;
+    return example::exit_mistake;
   }
 }

@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: MIT
 //
 /// @file
-/// The files a run leaves in its output folder: trajectory.tum, trajectory.kitti, map.ply, summary.json and
-/// report.html.
+/// The files a run leaves in its output folder: trajectory.tum, trajectory.kitti, map.ply, summary.json,
+/// report.html and timing.json. All but the last are the same bytes for the same options and data.
 #pragma once
 
 #include <filesystem>
@@ -14,18 +14,19 @@
 
 namespace stereo_slam {
 
-/// Makes the folder where it is missing and proves that files can be written there, so that a run does not
-/// end in vain. Throws cairn::Error naming it.
+/// Makes the folder where it is missing, removes what killed runs left and proves that files can be written
+/// there, so that a run does not end in vain. Throws cairn::Error naming it.
 void prepare_output_folder(const std::filesystem::path& folder);
 
-/// Writes all files or, throwing cairn::Error that names the path, none: they are completed in a folder of
-/// their own inside `folder` and moved out of it at the end. Returns why there is no report, where this
-/// program was built without the page for it (a report of an earlier run is then removed).
+/// Writes all files or, throwing cairn::Error that names the path, none: they take the place of another run's
+/// as one step (support/result_folder.hpp). Returns why there is no report, where this program was built
+/// without the page for it (a report of an earlier run is then removed).
 [[nodiscard]] std::optional<std::string> write_outputs(const RunRecord& run,
                                                        const std::filesystem::path& folder);
 
 /// map.ply: x y z [m, world of the first camera], grey and red green blue (all the same grey, for viewers
-/// that know no grey), sigma (root of the largest variance [m]), age [frames], sightings.
+/// that know no grey), sigma (root of the largest variance [m]), age [frames], sightings. A landmark with a
+/// number that is not finite is left out, and a comment says how many were.
 void write_map(const std::filesystem::path& path, const std::vector<LandmarkRecord>& landmarks);
 
 }  // namespace stereo_slam

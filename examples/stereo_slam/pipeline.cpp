@@ -104,7 +104,17 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options)
 }
 
 const FrameRecord& Pipeline::step(const StereoFrame& frame, double load_milliseconds) {
-  FrameRecord& result = record_.frames.emplace_back();
+  record_.frames.emplace_back();
+  try {
+    return work_on(frame, load_milliseconds);
+  } catch (...) {
+    record_.frames.pop_back();  // the record holds whole frames
+    throw;
+  }
+}
+
+const FrameRecord& Pipeline::work_on(const StereoFrame& frame, double load_milliseconds) {
+  FrameRecord& result = record_.frames.back();
   result.index = frame.index;
   result.time = frame.time;
   result.milliseconds[static_cast<std::size_t>(Stage::load)] = load_milliseconds;

@@ -68,7 +68,8 @@ class Pipeline {
 public:
   Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options);
 
-  /// Works on one frame; `load_milliseconds` is what reading it took. Returns what came of it.
+  /// Works on one frame; `load_milliseconds` is what reading it took. Returns what came of it. Where that
+  /// throws the record is of the frames before.
   const FrameRecord& step(const StereoFrame& frame, double load_milliseconds = 0);
 
   /// Everything that happened, with the map as it stands now.
@@ -95,6 +96,7 @@ private:
     std::vector<Match> agreed;
   };
 
+  const FrameRecord& work_on(const StereoFrame& frame, double load_milliseconds);
   void detect(const StereoFrame& frame);
   void find_local_landmarks(const StereoFrame& frame);
   [[nodiscard]] std::vector<Match> match_with_map() const;

@@ -134,7 +134,7 @@ int image_side(double value, const std::filesystem::path& file) {
   constexpr double longest = 65536;
   if (!(value >= 1 && value <= longest))
     cairn::raise(file.string() + ": expected an image size of 1 to 65536 pixels a side, found " +
-                 std::to_string(value));
+                 cairn::shortest(value));
   return static_cast<int>(std::lround(value));
 }
 
@@ -161,7 +161,9 @@ KeyedNumbers::KeyedNumbers(const std::filesystem::path& file) : file_(file.strin
     const std::size_t colon = lines.line().find(':');
     if (colon == std::string_view::npos) continue;
     std::optional<std::vector<double>> numbers = numbers_of(lines.line().substr(colon + 1));
-    if (numbers) values_[std::string(cairn::trimmed(lines.line().substr(0, colon)))] = std::move(*numbers);
+    const std::string key(cairn::trimmed(lines.line().substr(0, colon)));
+    if (numbers && !values_.emplace(key, std::move(*numbers)).second)
+      lines.fail("one line '" + key + ":', not a second");
   }
 }
 

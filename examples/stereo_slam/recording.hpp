@@ -38,7 +38,9 @@ struct Recording {
 /// the size that the rig says; where the rig says 0, the size of the first image.
 [[nodiscard]] std::unique_ptr<Dataset> play(Recording recording, std::size_t frames);
 
-/// Readers of the formats. Throw cairn::Error naming the file and what was expected.
+/// Readers of the formats. Throw cairn::Error naming the file and what was expected. Times may be equal, as
+/// those of published drives are, and may not run backwards; two images of one number or time, two poses of
+/// one frame and two lines of one key are refused.
 /// KITTI odometry: image_0, image_1, calib.txt with P0 and P1, times.txt, and poses in poses.txt or
 /// ../../poses/<name>.txt; or image_l, image_r and a calib.txt of two rows without names.
 [[nodiscard]] Recording read_kitti_odometry(const std::filesystem::path& folder);

@@ -19,7 +19,7 @@
 
 namespace stereo_slam {
 
-/// The stages of one step, in order; names as they stand in summary.json.
+/// The stages of one step, in order; names as they stand in timing.json.
 enum class Stage { load, detect, stereo, match, pose, update, store, total };
 inline constexpr std::array<const char*, 8> stage_names{"load", "detect", "stereo", "match",
                                                         "pose", "update", "store",  "total"};
@@ -77,7 +77,8 @@ struct RunRecord {
   std::vector<FrameRecord> frames;
   std::vector<LandmarkRecord> landmarks;
   std::optional<SampleFrame> sample;
-  std::vector<std::string> notes;  ///< what the reader should know: skipped frames, lost frames
+  std::vector<std::string> notes;          ///< what the reader should know: skipped frames, lost frames
+  std::optional<std::string> ended_early;  ///< after which frame the run ended and why, where it did
 };
 
 }  // namespace stereo_slam

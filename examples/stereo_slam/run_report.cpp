@@ -61,7 +61,6 @@ void add_figures(example::Report& report, const Summary& summary) {
                  "of " + std::to_string(summary.frames),
                  summary.frames_lost == 0 ? "none lost" : std::to_string(summary.frames_lost) + " lost",
                  summary.frames_lost == 0 ? Verdict::good : Verdict::bad});
-  report.figure({"rate", readable(summary.hz), "Hz", "whole run, loading included"});
   report.figure({"path", readable(summary.path), "m", ""});
   report.figure({"landmarks", std::to_string(summary.landmarks), "", "in the map at the end"});
   report.figure({"inliers", readable(summary.inliers), "", "median of a frame"});
@@ -165,36 +164,6 @@ example::LinePlot landmark_plot(const RunRecord& run, const TimeAxis& time) {
                       over_frames(run, [](const FrameRecord& frame) { return frame.landmarks; })}}};
 }
 
-example::LinePlot time_plot(const RunRecord& run, const TimeAxis& time) {
-  example::LinePlot plot{.title = "Time of every frame",
-                         .caption = "Logarithmic.",
-                         .x = time.axis,
-                         .y = {"time", "ms"},
-                         .x_values = time.values,
-                         .curves = {},
-                         .logarithmic = true};
-  constexpr std::array<Ink, stage_names.size()> inks{Ink::grey,   Ink::measurement, Ink::wrong,  Ink::teal,
-                                                     Ink::violet, Ink::grey,        Ink::belief, Ink::truth};
-  for (std::size_t stage = 0; stage < stage_names.size(); ++stage)
-    plot.curves.push_back(
-        {stage_names[stage], inks[stage],
-         over_frames(run, [&](const FrameRecord& frame) { return frame.milliseconds[stage]; }),
-         stage == static_cast<std::size_t>(Stage::update)});
-  return plot;
-}
-
-example::BarChart stage_bars(const Summary& summary) {
-  example::BarChart chart{.title = "Time per stage",
-                          .caption = "Thick: the middle frame. Thin: one frame in twenty takes longer.",
-                          .unit = "ms",
-                          .value_name = "median",
-                          .upper_name = "95th percentile",
-                          .bars = {}};
-  for (std::size_t stage = 0; stage < stage_names.size(); ++stage)
-    chart.bars.push_back({stage_names[stage], summary.stages[stage].median, summary.stages[stage].p95});
-  return chart;
-}
-
 example::Cloud map_cloud(const RunRecord& run) {
   example::Cloud cloud{.title = "Landmarks and path",
                        .caption = "The map at the end of the run.",
@@ -246,10 +215,9 @@ example::Picture sample_picture(const RunRecord& run) {
 }
 
 std::string subtitle_of(const RunRecord& run, const Summary& summary) {
-  return std::to_string(summary.frames) + " frames in " + example::readable(summary.seconds) + " s, store " +
-         run.store + ", " + std::to_string(run.target_points) + " " + run.features +
-         " points an image, seed " + std::to_string(run.seed) + ", " + std::to_string(run.threads) +
-         (run.threads == 1 ? " thread" : " threads");
+  return std::to_string(summary.frames) + " frames, store " + run.store + ", " +
+         std::to_string(run.target_points) + " " + run.features + " points an image, seed " +
+         std::to_string(run.seed) + "; times are in timing.json";
 }
 
 }  // namespace
@@ -257,6 +225,7 @@ std::string subtitle_of(const RunRecord& run, const Summary& summary) {
 example::Report run_report(const RunRecord& run, const Summary& summary) {
   example::Report report("Stereo SLAM: " + run.dataset, subtitle_of(run, summary));
   add_figures(report, summary);
+  if (run.ended_early) report.note(*run.ended_early);
   for (const std::string& note : run.notes) report.note(note);
   const TimeAxis time = time_axis(run);
   report.add(map_cloud(run));
@@ -266,8 +235,6 @@ example::Report run_report(const RunRecord& run, const Summary& summary) {
   report.add(error_plot(run, time, true));
   report.add(match_plot(run, time));
   report.add(landmark_plot(run, time));
-  report.add(stage_bars(summary));
-  report.add(time_plot(run, time));
   return report;
 }
 

@@ -85,7 +85,15 @@ std::optional<std::size_t> earlier_at_same_place(const std::vector<cairn::PosePa
   return nearest;
 }
 
+void expect_frames(const RunRecord& run) {
+  if (run.frames.empty()) cairn::raise("summary of a run: expected at least one frame, found none");
+}
+
 using Json = nlohmann::ordered_json;
+
+std::string text_of(const Json& json) {
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
 
 /// A number, or null where there is none or it is not finite.
 Json number(std::optional<double> value) {
@@ -146,15 +154,11 @@ std::optional<RevisitError> revisit_error(const std::vector<cairn::PosePair>& pa
 }
 
 Summary summarise(const RunRecord& run) {
-  if (run.frames.empty()) cairn::raise("summary of a run: expected at least one frame, found none");
+  expect_frames(run);
   Summary summary;
   summary.frames = run.frames.size();
   for (const FrameRecord& frame : run.frames) summary.frames_tracked += frame.tracked ? 1 : 0;
   summary.frames_lost = summary.frames - summary.frames_tracked;
-  summary.seconds = run.seconds;
-  summary.hz = run.seconds > 0 ? static_cast<double>(summary.frames) / run.seconds : 0;
-  for (std::size_t stage = 0; stage < stage_names.size(); ++stage)
-    summary.stages[stage] = stage_time(run, stage);
   summary.points_left = median_over_frames(run, &FrameRecord::points_left);
   summary.stereo_matches = median_over_frames(run, &FrameRecord::stereo_matches);
   summary.map_matches = median_over_frames(run, &FrameRecord::map_matches);
@@ -172,11 +176,7 @@ std::string summary_json(const RunRecord& run, const Summary& summary) {
   json["frames"] = summary.frames;
   json["frames_tracked"] = summary.frames_tracked;
   json["frames_lost"] = summary.frames_lost;
-  json["seconds"] = number(summary.seconds);
-  json["hz"] = number(summary.hz);
-  for (std::size_t stage = 0; stage < stage_names.size(); ++stage)
-    json["stage_ms"][stage_names[stage]] = {{"median", number(summary.stages[stage].median)},
-                                            {"p95", number(summary.stages[stage].p95)}};
+  json["ended_early"] = run.ended_early ? Json(*run.ended_early) : Json(nullptr);
   json["points_left"] = number(summary.points_left);
   json["stereo_matches"] = number(summary.stereo_matches);
   json["map_matches"] = number(summary.map_matches);
@@ -186,10 +186,36 @@ std::string summary_json(const RunRecord& run, const Summary& summary) {
   json["features"] = run.features;
   json["store"] = run.store;
   json["seed"] = run.seed;
-  json["threads"] = run.threads;
   json["target_points"] = run.target_points;
   json["notes"] = run.notes;
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return text_of(json);
+}
+
+Timing timing(const RunRecord& run) {
+  expect_frames(run);
+  Timing timing;
+  timing.seconds = run.seconds;
+  timing.hz = run.seconds > 0 ? static_cast<double>(run.frames.size()) / run.seconds : 0;
+  for (std::size_t stage = 0; stage < stage_names.size(); ++stage)
+    timing.stages[stage] = stage_time(run, stage);
+  return timing;
+}
+
+std::string timing_json(const RunRecord& run) {
+  const Timing times = timing(run);
+  Json json;
+  json["frames"] = run.frames.size();
+  json["threads"] = run.threads;
+  json["seconds"] = number(times.seconds);
+  json["hz"] = number(times.hz);
+  for (std::size_t stage = 0; stage < stage_names.size(); ++stage) {
+    Json& of_stage = json["stage_ms"][stage_names[stage]];
+    of_stage["median"] = number(times.stages[stage].median);
+    of_stage["p95"] = number(times.stages[stage].p95);
+    for (const FrameRecord& frame : run.frames)
+      json["frame_ms"][stage_names[stage]].push_back(number(frame.milliseconds[stage]));
+  }
+  return text_of(json);
 }
 
 }  // namespace stereo_slam

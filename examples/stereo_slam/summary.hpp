@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: MIT
 //
 /// @file
-/// The key figures of a run: how well it tracked, how far it was from the truth, how long each stage took.
+/// The key figures of a run: how well it tracked, how far it was from the truth, and, apart from them because
+/// they differ from run to run, how long each stage took.
 ///
 /// Two views of the same error stand side by side. Absolute error (ATE) and relative error (RPE) are what the
 /// literature compares: ATE after the rigid fit of all positions, RPE between successive frames. Everything
@@ -67,9 +68,6 @@ struct Summary {
   std::size_t frames = 0;
   std::size_t frames_tracked = 0;
   std::size_t frames_lost = 0;
-  double seconds = 0;
-  double hz = 0;  ///< frames per second of the whole run, loading included
-  std::array<StageTime, stage_names.size()> stages{};
   double points_left = 0;  ///< median over frames, as the next three
   double stereo_matches = 0;
   double map_matches = 0;
@@ -77,6 +75,12 @@ struct Summary {
   std::size_t landmarks = 0;
   double path = 0;  ///< [m], of the truth where every frame has one, otherwise of the estimate
   std::optional<TruthErrors> errors;
+};
+
+struct Timing {
+  double seconds = 0;
+  double hz = 0;  ///< frames per second of the whole run, loading included
+  std::array<StageTime, stage_names.size()> stages{};
 };
 
 /// The frames that have a truth, in order.
@@ -93,7 +97,14 @@ struct Summary {
 /// The key figures of a run with at least one frame. Throws cairn::Error without frames.
 [[nodiscard]] Summary summarise(const RunRecord& run);
 
-/// summary.json of a run: SI units as the keys say, null where nothing is known.
+/// The times of a run with at least one frame. Throws cairn::Error without frames.
+[[nodiscard]] Timing timing(const RunRecord& run);
+
+/// summary.json of a run: SI units as the keys say, null where nothing is known. Has no times and no number
+/// of threads: a run with the same options on the same data gives the same bytes.
 [[nodiscard]] std::string summary_json(const RunRecord& run, const Summary& summary);
+
+/// timing.json of a run: everything that is another the next time.
+[[nodiscard]] std::string timing_json(const RunRecord& run);
 
 }  // namespace stereo_slam

@@ -201,18 +201,6 @@ void Report::add(const Picture& panel) {
   panels_.push_back(dumped(json));
 }
 
-void Report::add(const BarChart& panel) {
-  Json json = head("bars", panel);
-  json["unit"] = panel.unit;
-  json["value_name"] = panel.value_name;
-  json["upper_name"] = panel.upper_name;
-  json["bars"] = Json::array();
-  for (const Bar& bar : panel.bars)
-    json["bars"].push_back(
-        {{"name", bar.name}, {"value", rounded(bar.value)}, {"upper", rounded(bar.upper)}});
-  panels_.push_back(dumped(json));
-}
-
 void Report::add(const Table& panel) {
   for (const std::vector<std::string>& row : panel.rows)
     expect_as_many(row.size(), panel.columns.size(), panel.title, "a row");

@@ -101,24 +101,6 @@ struct Picture {
   bool wide = false;
 };
 
-/// A bar with a thin one behind it: a usual value and an upper one.
-struct Bar {
-  std::string name = {};
-  double value = 0;
-  double upper = 0;
-};
-
-/// Horizontal bars on a common scale.
-struct BarChart {
-  std::string title = {};
-  std::string caption = {};
-  std::string unit = {};
-  std::string value_name = {};  ///< "median"
-  std::string upper_name = {};  ///< "95th percentile"
-  std::vector<Bar> bars = {};
-  bool wide = false;
-};
-
 struct Table {
   std::string title = {};
   std::string caption = {};
@@ -167,7 +149,6 @@ public:
   void add(const LinePlot& panel);
   void add(const PlanePlot& panel);
   void add(const Picture& panel);
-  void add(const BarChart& panel);
   void add(const Table& panel);
   void add(const Cloud& panel);
 

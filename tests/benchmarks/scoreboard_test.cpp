@@ -2,7 +2,18 @@
 // SPDX-License-Identifier: MIT
 #include "support/scoreboard.hpp"
 
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <sstream>
+#include <string>
+#include <vector>
+
 #include <doctest/doctest.h>
+
+#include <cairn/version.hpp>
+
+#include "support/folder.hpp"
 
 TEST_SUITE("scoreboard") {
   using cairn_bench::Row;
@@ -34,6 +45,56 @@ TEST_SUITE("scoreboard") {
     const Row row = cairn_bench::against_rival("build", 2.0, 5.0, "FLANN", 1.5, 3.0);
     CHECK(row.measured == doctest::Approx(2.5));
     CHECK(verdict(row) == "met must");
+  }
+
+  TEST_CASE("scoreboard: a program answers --help and --version, refuses what it has not, else runs") {
+    std::ostringstream said, complained;
+    std::streambuf* const out = std::cout.rdbuf(said.rdbuf());
+    std::streambuf* const err = std::cerr.rdbuf(complained.rdbuf());
+    const auto answer = [](std::vector<std::string> words) {
+      std::vector<char*> arguments;
+      for (std::string& word : words) arguments.push_back(word.data());
+      return cairn_bench::answer(static_cast<int>(arguments.size()), arguments.data(), "board",
+                                 {"low", "high"});
+    };
+    const auto none = answer({"board"}), part = answer({"board", "low"}),
+               two = answer({"board", "high", "low"});
+    const auto wrong = answer({"board", "low", "middle"}), option = answer({"board", "--fast"});
+    const auto help = answer({"board", "low", "--help"}), version = answer({"board", "--version"});
+    std::cout.rdbuf(out);
+    std::cerr.rdbuf(err);
+    CHECK_FALSE(none.has_value());
+    CHECK_FALSE(part.has_value());
+    CHECK_FALSE(two.has_value());
+    CHECK(wrong == 2);
+    CHECK(option == 2);
+    CHECK(help == 0);
+    CHECK(version == 0);
+    CHECK(complained.str().find("board: 'middle' is no option\nusage: board [low] [high]") == 0);
+    CHECK(said.str().find("usage: board [low] [high]") == 0);
+    CHECK(said.str().find("board " CAIRN_VERSION_STRING "\n") != std::string::npos);
+  }
+
+  TEST_CASE("scoreboard: a table that cannot be written down is no success") {
+    const cairn_test::Folder folder;
+    folder.put("file", "");
+    std::ostringstream said;
+    std::streambuf* const out = std::cout.rdbuf(said.rdbuf());
+    std::streambuf* const err = std::cerr.rdbuf(said.rdbuf());
+    const auto finish = [&](const std::string& where) {
+      ::setenv("CAIRN_SCOREBOARD_DIR", where.c_str(), 1);
+      cairn_bench::Scoreboard board("tried");
+      board.add({.name = "row", .measured = 1, .must = 2});
+      return board.finish();
+    };
+    const int good = finish((folder / "new").string()), bad = finish((folder / "file").string());
+    std::cout.rdbuf(out);
+    std::cerr.rdbuf(err);
+    ::unsetenv("CAIRN_SCOREBOARD_DIR");
+    CHECK(good == 0);
+    CHECK(bad == 1);
+    CHECK(std::filesystem::exists(folder / "new" / "tried.json"));
+    CHECK(said.str().find("tried.json: cannot write (Not a directory)") != std::string::npos);
   }
 
   TEST_CASE("timing: the ratio of contenders that do one and four times the work is about four") {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <limits>
 #include <string>
 
 #include <doctest/doctest.h>
@@ -170,18 +171,32 @@ TEST_SUITE("correlation_navigation") {
     flight.frames = 2;
     results.straight = fly_straight(flight, 2);
     results.divergence = {{0.5, 0.25, 0.0, 0.0}};
-    write_outputs(results, folder / "out");
+    static_cast<void>(write_outputs(results, folder / "out"));
     const auto json = nlohmann::json::parse(cairn::read_file(folder / "out" / "summary.json"));
     for (const char* key : {"acquisition_rate", "rms_position_error_m", "max_position_error_m",
                             "rmse_over_crb", "nees_mean", "divergence_rate"})
       CHECK(json.contains(key));
     CHECK(json["divergence_rate"][0]["initial_error_over_correlation_length"] == 0.5);
     CHECK(json["rmse_over_crb"] == results.straight.rmse_over_bound);
+    // What was not made has no figures, and what was not found no error.
+    for (const char* key : {"acquisition_rate", "acquisition_rms_error_m", "planar", "loop"})
+      CHECK(json[key].is_null());
+    results.acquisition = AcquisitionResult{};
+    results.planar = PlanarResult{};
+    results.loop = LoopResult{};
+    const auto none = nlohmann::json::parse(summary(results));
+    CHECK(none["acquisition_rate"] == 0);
+    CHECK(none["acquisition_rms_error_m"].is_null());
+    CHECK(none["planar"]["rms_position_error_m"].is_null());
+    CHECK(none["loop"]["closing_error_m"].is_null());
     CHECK(cairn::read_file(folder / "out" / "errors.csv").find("time,x_rms,x_sigma") == 0);
+    results.straight.sigma[1][1] = std::numeric_limits<double>::quiet_NaN();
+    CHECK(cairn_test::message_of([&] { static_cast<void>(errors_csv(results.straight)); }) ==
+          "errors.csv: not written, V_sigma of row 2 is not finite");
     folder.put("file", "x");
     CHECK(cairn_test::message_of([&] {
-            write_outputs(results, folder / "file" / "out");
-          }).find("cannot make this folder") != std::string::npos);
+            static_cast<void>(write_outputs(results, folder / "file" / "out"));
+          }).find("file/out: cannot write there (Not a directory)") != std::string::npos);
   }
 }
 

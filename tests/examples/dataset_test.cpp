@@ -272,6 +272,13 @@ TEST_SUITE("dataset") {
     CHECK(says(broken([](F f) { replace_in(f / "calib.txt", "P1: 100", "P1: nan"); }), {"not finite"}));
     CHECK(says(broken([](F f) { replace_in(f / "calib.txt", "-50", "50"); }), {"to the right"}));
     CHECK(says(broken([](F f) { f.put("times.txt", "0\n0.1\n"); }), {"times.txt", "3 frames"}));
+    CHECK(says(broken([](F f) { f.put("times.txt", "5\n3\n3\n"); }), {"times.txt:2", "backwards"}));
+    CHECK(says(broken([](F f) { f.put("times.txt", "5\n5\n-1\n"); }), {"times.txt:3", "backwards"}));
+    CHECK(says(broken([](F f) { f.put("times.txt", "0\nnan\n1\n"); }), {"times.txt:2", "finite"}));
+    CHECK(says(broken([](F f) { f.put("times.txt", "0\n1\n2\n3\n"); }), {"times.txt:4", "no more than 3"}));
+    CHECK(broken([](F f) { f.put("times.txt", "0\n1\n1\n"); }).empty());  // as published drives have them
+    CHECK(says(broken([](F f) { replace_in(f / "calib.txt", "P1:", "P0: 1\nP1:"); }),
+               {"calib.txt:2", "one line 'P0:'"}));
     CHECK(says(broken([](F f) { f.put("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n"); }),
                {"poses.txt: holds 1 poses; expected 3, one a frame"}));
     CHECK(says(broken([](F f) { replace_in(f / "poses.txt", "1 0", "2 0"); }), {"poses.txt:1"}));
@@ -342,7 +349,8 @@ TEST_SUITE("dataset") {
                  {"calib_cam_to_cam.txt: lacks the key " + key + "; expected '" + key + ":'"}));
     CHECK(says(broken(calibration("R_01: 0 -1", "R_01: 0 -2")), {"calib_cam_to_cam.txt", "rotation matrix"}));
     CHECK(says(broken(calibration("K_00: 100", "K_00: -100")), {"calib_cam_to_cam.txt", "focal"}));
-    CHECK(says(broken(calibration("S_00: 12", "S_00: 1e99")), {"calib_cam_to_cam.txt", "image size"}));
+    CHECK(says(broken(calibration("S_00: 12", "S_00: 1e99")),
+               {"calib_cam_to_cam.txt", "image size", "found 1e+99"}));
     CHECK(says(broken(calibration("S_00: 12", "S_00: 13")), {"0000000001.png", "expected 13 x 8"}));
     CHECK(says(broken([](F f) { fs::remove(f / "calib_cam_to_cam.txt"); }),
                {"calib_cam_to_cam.txt: no such file", "expected the calibration"}));
@@ -352,7 +360,36 @@ TEST_SUITE("dataset") {
     CHECK(says(broken([](F f) { replace_in(f / "image_00/timestamps.txt", "23:59", "soon"); }),
                {"timestamps.txt:1", "expected a time"}));
     CHECK(says(broken([](F f) { f.put("image_00/timestamps.txt", "2011-09-26 23:59:59.0\n"); }),
-               {"timestamps.txt: holds 1 times; expected at least 6"}));
+               {"timestamps.txt: holds 1 times; expected one for each frame up to the last, 5"}));
+    for (const std::string stamp :
+         {"2011-09-26 14:05:nan", "2011-09-26 14:05:inf", "2011-09-26 14:05:60.0", "2011-09-26 14:60:00",
+          "2011-09-26 24:00:00", "2011-02-29 14:05:00", "2011-13-01 14:05:00", "2011-09-26 14:05:-1",
+          "2011-09-26 14:05:1e1", "2011-09-26 14:05:00.", "2011-09-26 14:05:00.5x", "2011-09-26T14:05:00",
+          "2011/09/26 14:05:00", "+011-09-26 14:05:00", "2011-09-26 14:05", "14:05:00", "nan",
+          "1316959535.5"}) {
+      CAPTURE(stamp);
+      CHECK(says(broken([&](F f) {
+                   std::string times;
+                   for (int i = 0; i < 6; ++i) times += (i == 2 ? stamp : "2011-09-26 14:05:00.5") + "\n";
+                   f.put("image_00/timestamps.txt", times);
+                 }),
+                 {"timestamps.txt:3", "expected a time"}));
+    }
+    CHECK(says(broken([](F f) { replace_in(f / "image_00/timestamps.txt", "59.2", "59.0"); }),
+               {"timestamps.txt:3", "times that do not run backwards"}));
+    CHECK(broken([](F f) { replace_in(f / "image_00/timestamps.txt", "59.2", "59.1"); }).empty());
+    CHECK(says(broken([](F f) {
+                 for (const int camera : {0, 1})
+                   fs::rename(f.image(camera, 5),
+                              f.image(camera, 5).parent_path() / "18446744073709551615.png");
+               }),
+               {"timestamps.txt: holds 6 times", "18446744073709551615"}));
+    CHECK(says(broken([](F f) { fs::copy(f.image(1, 2), f / "image_01/data/2.png"); }),
+               {"2.png: has the number of 0000000002.png; expected one image a number"}));
+    CHECK(says(broken([](F f) { replace_in(f / "poses_cam0_rectified.txt", "\n2 1", "\n1 1"); }),
+               {"poses_cam0_rectified.txt:3", "not a second of 1"}));
+    CHECK(says(broken(calibration("R_rect_00: 0 -1", "R_rect_00: 0 -2")),
+               {"calib_cam_to_cam.txt", "rotation matrix"}));
     CHECK(says(broken([](F f) { replace_in(f / "poses_cam0_rectified.txt", "\n1 1", "\n1 1 1"); }),
                {"poses_cam0_rectified.txt:2", "13 numbers"}));
     CHECK(says(broken([](F f) { replace_in(f / "poses_cam0_rectified.txt", "\n1 1", "\n1 3"); }),
@@ -417,6 +454,30 @@ TEST_SUITE("dataset") {
     CHECK(says(broken([](F f) { f.put("mav0/state_groundtruth_estimate0/data.csv", "1,2\n"); }),
                {"state_groundtruth_estimate0/data.csv:1"}));
     CHECK(broken([](F) {}).empty());
+  }
+
+  TEST_CASE("euroc: a list belongs to its key, a key and a time stand once") {
+    const auto broken = [](const std::string& from, const std::string& to) {
+      const EurocFolder folder;
+      replace_in(folder / "mav0/cam0/sensor.yaml", from, to);
+      return refusal("euroc", folder.path());
+    };
+    // Without its own list, the intrinsics would be the four numbers of the distortion.
+    CHECK(says(broken("intrinsics: [458.654, 457.296, 6.2, 4.3] #fu, fv, cu, cv\n", "intrinsics:\n"),
+               {"sensor.yaml", "'intrinsics' with a list of 4"}));
+    CHECK(says(broken("rate_hz: 20\n", "rate_hz: 20\nintrinsics: [1, 2, 3, 4]\n"),
+               {"sensor.yaml", "the key intrinsics once"}));
+    CHECK(broken("data: [0.0", "!!opencv-matrix\n  dt: d\n  data: [0.0").empty());
+    const EurocFolder folder;
+    const std::string list = cairn::read_file(folder / "mav0/cam0/data.csv");
+    folder.put("mav0/cam0/data.csv", list + EurocFolder::time(1) + ",again.png\n");
+    CHECK(says(refusal("euroc", folder.path()), {"data.csv:6", "one image a time"}));
+    folder.put("mav0/cam0/data.csv", list + EurocFolder::time(9) + ", \n");
+    CHECK(says(refusal("euroc", folder.path()), {"data.csv:6", "nanoseconds,file name"}));
+    // Images are paired by time: lines need no order.
+    folder.put("mav0/cam0/data.csv",
+               list.substr(list.find('\n') + 1) + "1403636579763555585,late.png\n" + "17,first.png\n");
+    CHECK(open("euroc", folder.path())->size() == 2);
   }
 
   TEST_CASE("dataset: frames may be read from several threads") {

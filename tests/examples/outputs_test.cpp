@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
+#include <limits>
 #include <set>
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include <doctest/doctest.h>
 #include <nlohmann/json.hpp>
@@ -33,7 +35,7 @@ std::set<std::string> names_in(const fs::path& folder) {
 }
 
 std::set<std::string> expected_names() {
-  std::set<std::string> names{"map.ply", "summary.json", "trajectory.kitti", "trajectory.tum"};
+  std::set<std::string> names{"map.ply", "summary.json", "timing.json", "trajectory.kitti", "trajectory.tum"};
   if (example::has_report_page()) names.insert("report.html");
   return names;
 }
@@ -119,14 +121,37 @@ TEST_CASE("outputs: a second run replaces the first") {
   CHECK(names_in(folder.path()) == expected_names());
 }
 
-TEST_CASE("outputs: the same run gives the same bytes") {
+TEST_CASE("outputs: the same run gives the same bytes, whatever time it took and on how many threads") {
   const Folder one, other;
-  (void)stereo_slam::write_outputs(cairn_test::circular_run(30, 50), one.path());
-  (void)stereo_slam::write_outputs(cairn_test::circular_run(30, 50), other.path());
+  auto run = cairn_test::circular_run(30, 50);
+  (void)stereo_slam::write_outputs(run, one.path());
+  (void)stereo_slam::write_outputs(run, other.path());
+  for (const std::string& name : expected_names())
+    CHECK(cairn::read_file(one / name) == cairn::read_file(other / name));
+  run.seconds *= 1.5;
+  run.threads += 1;
+  for (auto& frame : run.frames) frame.milliseconds.fill(1.25);
+  (void)stereo_slam::write_outputs(run, other.path());
   for (const std::string& name : expected_names()) {
     CAPTURE(name);
-    CHECK(cairn::read_file(one / name) == cairn::read_file(other / name));
+    CHECK((cairn::read_file(one / name) == cairn::read_file(other / name)) == (name != "timing.json"));
   }
+}
+
+TEST_CASE("outputs: a landmark that is not finite is left out of the map, which says so") {
+  const Folder folder;
+  std::vector<stereo_slam::LandmarkRecord> landmarks(4);
+  for (auto& landmark : landmarks) {
+    landmark.position.setZero();
+    landmark.covariance.setIdentity();
+  }
+  landmarks[1].position(2) = std::numeric_limits<double>::quiet_NaN();
+  landmarks[2].covariance(0, 1) = std::numeric_limits<double>::infinity();
+  landmarks[3].position(0) = 1e300;  // beyond a float
+  stereo_slam::write_map(folder / "map.ply", landmarks);
+  const std::string bytes = cairn::read_file(folder / "map.ply");
+  CHECK(bytes.find("element vertex 1\n") != std::string::npos);
+  CHECK(bytes.find("comment left out, with numbers that are not finite: 3\n") != std::string::npos);
 }
 
 TEST_CASE("outputs: a folder that cannot be made is named, and nothing is left") {

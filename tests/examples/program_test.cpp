@@ -2,64 +2,197 @@
 // SPDX-License-Identifier: MIT
 //
 // The program as a user meets it: its exit code, its words and what it leaves behind.
+#include "support/program.hpp"
+
+#include <csignal>
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
-#include <iterator>
+#include <initializer_list>
+#include <set>
 #include <string>
 
 #include <doctest/doctest.h>
-#include <sys/wait.h>
+#include <nlohmann/json.hpp>
+#include <sys/mount.h>
+
+#include <cairn/io/file.hpp>
+#include <cairn/io/trajectory.hpp>
+#include <cairn/version.hpp>
 
 #include "support/folder.hpp"
+#include "support/report.hpp"
 
 namespace program_test {
 namespace {
 
 namespace fs = std::filesystem;
+using cairn_test::names_in;
+using cairn_test::Outcome;
 
-struct Outcome {
-  int code;
-  std::string words;
-};
-
-Outcome run(const std::string& arguments, const cairn_test::Folder& folder) {
-  const fs::path words = folder / "words.txt";
-  const std::string command = std::string("XDG_CACHE_HOME=\"") + (folder / "cache").string() + "\" \"" +
-                              STEREO_SLAM_PROGRAM + "\" " + arguments + " >\"" + words.string() + "\" 2>&1";
-  const int status = std::system(command.c_str());  // NOLINT(cert-env33-c): our own program
-  std::ifstream file(words);
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, {std::istreambuf_iterator<char>(file), {}}};
+/// Rendered pictures are kept from one case to the next, not from one run of the tests to the next.
+void keep_pictures() {
+  static const cairn_test::Folder folder;
+  ::setenv("XDG_CACHE_HOME", folder.path().c_str(), 1);
 }
 
-bool says(const Outcome& outcome, const std::string& word) {
-  return outcome.words.find(word) != std::string::npos;
+Outcome run(const std::string& arguments, const std::string& standard_output = "") {
+  keep_pictures();
+  return cairn_test::run_program(std::string("\"") + STEREO_SLAM_PROGRAM + "\" " + arguments,
+                                 standard_output);
+}
+
+int run_and_interrupt(const fs::path& out, int frames, std::initializer_list<int> signals) {
+  keep_pictures();
+  return cairn_test::interrupt_program(
+      {STEREO_SLAM_PROGRAM, "--frames", std::to_string(frames), "--out", out.string()}, signals);
+}
+
+nlohmann::json summary_in(const fs::path& out) {
+  return nlohmann::json::parse(cairn::read_file(out / "summary.json"));
+}
+
+std::set<std::string> results() {
+  std::set<std::string> names{"trajectory.tum", "trajectory.kitti", "map.ply", "summary.json", "timing.json"};
+  if (example::has_report_page()) names.insert("report.html");
+  return names;
+}
+
+/// A drive of `frames` frames in the folder "drive".
+void make_drive(const cairn_test::Folder& folder, int frames) {
+  const Outcome outcome =
+      run("--frames " + std::to_string(frames) + " --dump \"" + (folder / "drive").string() + "\"");
+  CAPTURE(outcome.words);
+  REQUIRE(outcome.code == 0);
+}
+
+void tear(const fs::path& file) {
+  const std::string bytes = cairn::read_file(file);
+  cairn::write_file_atomically(file, bytes.substr(0, bytes.size() / 2));
 }
 
 }  // namespace
 
 TEST_SUITE("program") {
   TEST_CASE("stereo_slam: --help names every option and ends well") {
-    const cairn_test::Folder folder;
-    const Outcome help = run("--help", folder);
+    const Outcome help = run("--help");
     CHECK(help.code == 0);
     for (const char* option :
          {"--dataset", "--out", "--frames", "--seed", "--threads", "--store", "--points", "kitti_raw"}) {
       CAPTURE(option);
-      CHECK(says(help, option));
+      CHECK(help.says(option));
     }
   }
 
   TEST_CASE("stereo_slam: a mistake on the command line is exit code 2 and a sentence") {
-    const cairn_test::Folder folder;
     for (const std::string mistake :
-         {"--store forest", "--points many", "--threads 0", "--frames -3", "--nonsense", "--script up"}) {
+         {"--store forest", "--points many", "--threads 0", "--frames -3", "--frames 1e99", "--nonsense",
+          "--script up", "--seed -1", "--seed 99999999999999999999", "--drift nan", "--drift 1e308", "--out",
+          "somewhere", "--frames 99999999999999999999999999999999999999999999999999999999999999"}) {
       CAPTURE(mistake);
-      const Outcome outcome = run(mistake, folder);
+      const Outcome outcome = run(mistake);
+      CAPTURE(outcome.words);
       CHECK(outcome.code == 2);
       CHECK(outcome.words.size() > 10);
+      CHECK(outcome.words.size() < 200);
     }
-    CHECK(run("--dataset nowhere", folder).code == 2);
+    CHECK(run("--dataset nowhere").code == 2);
+    CHECK(run("--frames -3").says("--frames: expected a whole number of at least 0, found '-3'"));
+  }
+
+  TEST_CASE("stereo_slam: --version says which") {
+    const Outcome version = run("--version");
+    CHECK(version.code == 0);
+    CHECK(version.words == "stereo_slam " CAIRN_VERSION_STRING "\n");
+  }
+
+  TEST_CASE("stereo_slam: words that do not get through are no success") {
+    const cairn_test::Folder folder;
+    for (const std::string asked : {"--help", "--version", "--frames 2"}) {
+      CAPTURE(asked);
+      const Outcome outcome = run(asked + " --out \"" + (folder / "out").string() + "\"", "/dev/full");
+      CHECK(outcome.code == 2);
+      CHECK(outcome.says("cannot write to the standard output (No space left on device)"));
+    }
+    CHECK(names_in(folder / "out") == results());  // they are there all the same
+  }
+
+  TEST_CASE("stereo_slam: a torn image in the middle ends the run, and what was there is written") {
+    const cairn_test::Folder folder;
+    make_drive(folder, 8);
+    tear(folder / "drive" / "image_1" / "000005.png");
+    const std::string arguments = "--dataset kitti_odometry \"" + (folder / "drive").string() +
+                                  "\" --out \"" + (folder / "out").string() + "\"";
+    for (const std::string threads : {"1", "2"}) {
+      const Outcome outcome = run(arguments + " --threads " + threads);
+      CAPTURE(outcome.words);
+      CHECK(outcome.code == 3);
+      CHECK(outcome.says("stereo_slam: ended after 5 of 8 frames: "));
+      CHECK(outcome.says("000005.png: damaged PNG"));
+      CHECK(names_in(folder / "out") == results());
+      const nlohmann::json summary = summary_in(folder / "out");
+      CHECK(summary["frames"] == 5);
+      CHECK(summary["ended_early"].get<std::string>().starts_with("ended after 5 of 8 frames: "));
+      CHECK(cairn::read_tum(folder / "out" / "trajectory.tum").size() == 5);
+    }
+  }
+
+  TEST_CASE("stereo_slam: where the first image is torn there is nothing to write, and old results stay") {
+    const cairn_test::Folder folder;
+    make_drive(folder, 3);
+    const std::string arguments = "--dataset kitti_odometry \"" + (folder / "drive").string() +
+                                  "\" --out \"" + (folder / "out").string() + "\"";
+    REQUIRE(run(arguments).code == 0);
+    tear(folder / "drive" / "image_0" / "000000.png");
+    const Outcome outcome = run(arguments);
+    CAPTURE(outcome.words);
+    CHECK(outcome.code == 2);
+    CHECK(outcome.says("000000.png: damaged PNG"));
+    CHECK(summary_in(folder / "out")["frames"] == 3);
+  }
+
+  TEST_CASE("stereo_slam: interrupted, it writes what there is, says so and ends with 4") {
+    for (const int signal : {SIGINT, SIGTERM, SIGHUP}) {
+      CAPTURE(signal);
+      const cairn_test::Folder folder;
+      CHECK(run_and_interrupt(folder / "out", 30, {signal}) == 4);
+      CHECK(names_in(folder / "out") == results());
+      const nlohmann::json summary = summary_in(folder / "out");
+      const auto frames = summary["frames"].get<std::size_t>();
+      CHECK(frames >= 3);
+      CHECK(frames < 30);
+      CHECK(cairn::read_tum(folder / "out" / "trajectory.tum").size() == frames);
+      const char* name = signal == SIGINT ? "SIGINT" : signal == SIGTERM ? "SIGTERM" : "SIGHUP";
+      CHECK(summary["ended_early"] ==
+            "ended after " + std::to_string(frames) + " of 30 frames: interrupted (" + name + ")");
+    }
+  }
+
+  TEST_CASE("stereo_slam: interrupted twice, it ends at once") {
+    const cairn_test::Folder folder;
+    CHECK(run_and_interrupt(folder / "out", 30, {SIGINT, SIGINT}) == -SIGINT);
+    CHECK(run_and_interrupt(folder / "out", 30, {SIGTERM, SIGINT}) == -SIGINT);
+  }
+
+  TEST_CASE("stereo_slam: a full disk is said to be full, and the results of the run before stay") {
+    const cairn_test::Folder folder;
+    fs::create_directory(folder / "small");
+    if (::mount("cairn", (folder / "small").c_str(), "tmpfs", 0, "size=300k") != 0) {
+      MESSAGE("skipped: may not mount a small disk");
+      return;
+    }
+    const fs::path out = folder / "small" / "out";
+    const std::string arguments = "--frames 2 --out \"" + out.string() + "\"";
+    fs::create_directory(out);
+    cairn::write_file_atomically(out / "trajectory.tum", "of another run\n");
+    cairn::write_file_atomically(out / "report.html", std::string(250000, 'x'));  // leaves too little
+    const Outcome outcome = run(arguments);
+    CAPTURE(outcome.words);
+    CHECK(outcome.code == 2);
+    CHECK(outcome.says("No space left on device"));
+    CHECK(cairn::read_file(out / "trajectory.tum") == "of another run\n");
+    CHECK(names_in(folder / "small") == std::set<std::string>{"out"});
+    CHECK(names_in(out) == std::set<std::string>{"trajectory.tum", "report.html"});
+    ::umount((folder / "small").c_str());
   }
 
   TEST_CASE("stereo_slam: a missing data folder is named, and nothing is left behind") {
@@ -67,9 +200,9 @@ TEST_SUITE("program") {
     for (const std::string kind : {"kitti_odometry", "kitti_raw", "euroc"}) {
       CAPTURE(kind);
       const Outcome outcome =
-          run("--dataset " + kind + " /no/such/drive --out \"" + (folder / "out").string() + "\"", folder);
+          run("--dataset " + kind + " /no/such/drive --out \"" + (folder / "out").string() + "\"");
       CHECK(outcome.code == 2);
-      CHECK(says(outcome, "/no/such/drive"));
+      CHECK(outcome.says("/no/such/drive"));
       CHECK_FALSE(fs::exists(folder / "out"));
     }
   }
@@ -77,28 +210,27 @@ TEST_SUITE("program") {
   TEST_CASE("stereo_slam: an output folder that cannot be is named before the work begins") {
     const cairn_test::Folder folder;
     folder.put("file", "not a folder");
-    const Outcome outcome = run("--frames 2 --out \"" + (folder / "file").string() + "\"", folder);
+    const Outcome outcome = run("--frames 2 --out \"" + (folder / "file").string() + "\"");
     CHECK(outcome.code == 2);
-    CHECK(says(outcome, (folder / "file").string()));
+    CHECK(outcome.says((folder / "file").string()));
   }
 
-  TEST_CASE("stereo_slam: three frames of the arena leave every file, the same bytes for 1 and 2 threads") {
+  TEST_CASE("stereo_slam: every file is the same bytes for 1, 2 and 3 threads and the next time, but times") {
     const cairn_test::Folder folder;
-    const auto bytes = [&](const std::string& out) {
-      std::ifstream file(folder / out / "trajectory.tum", std::ios::binary);
-      return std::string{std::istreambuf_iterator<char>(file), {}};
-    };
-    for (const std::string threads : {"1", "2"}) {
-      const Outcome outcome =
-          run("--frames 3 --threads " + threads + " --out \"" + (folder / ("out" + threads)).string() + "\"",
-              folder);
+    for (const std::string out : {"1", "2", "3", "2 again"}) {
+      const Outcome outcome = run("--frames 4 --threads " + out.substr(0, 1) + " --out \"" +
+                                  (folder / ("out " + out)).string() + "\"");
       CAPTURE(outcome.words);
       REQUIRE(outcome.code == 0);
-      for (const char* name : {"trajectory.tum", "trajectory.kitti", "map.ply", "summary.json"})
-        CHECK(fs::file_size(folder / ("out" + threads) / name) > 0);
+      REQUIRE(names_in(folder / ("out " + out)) == results());
     }
-    CHECK_FALSE(bytes("out1").empty());
-    CHECK(bytes("out1") == bytes("out2"));
+    for (const std::string& name : results()) {
+      CAPTURE(name);
+      const std::string bytes = cairn::read_file(folder / "out 1" / name);
+      CHECK_FALSE(bytes.empty());
+      for (const char* out : {"out 2", "out 3", "out 2 again"})
+        CHECK((cairn::read_file(folder / out / name) == bytes) == (name != "timing.json"));
+    }
   }
 }
 

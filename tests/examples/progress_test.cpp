@@ -3,10 +3,12 @@
 #include "support/progress.hpp"
 
 #include <algorithm>
+#include <cstdlib>
 #include <sstream>
 #include <string>
 
 #include <doctest/doctest.h>
+#include <unistd.h>
 
 namespace progress_test {
 namespace {
@@ -52,6 +54,53 @@ TEST_CASE("progress: on a terminal one line is rewritten and ended once") {
 TEST_CASE("progress: a run that stops early leaves the cursor on a new line") {
   CHECK(after(500, 2, true).back() == '\n');
   CHECK(after(500, 0, true).empty());
+}
+
+TEST_CASE("progress: the line is never as wide as the terminal, so that it does not scroll") {
+  for (const std::size_t columns : {1U, 2U, 20U, 50U, 79U, 200U}) {
+    CAPTURE(columns);
+    std::ostringstream out;
+    {
+      example::Progress progress(out, "tracking", 2000, true, columns);
+      for (std::size_t i = 0; i < 2000; ++i)
+        progress.step("1234 of 1448 points agree, 1677 landmarks, \xe2\x82\xac and \xc3\xa4");
+    }
+    const std::string text = out.str();
+    for (std::size_t from = text.find('\r'); from != std::string::npos; from = text.find('\r', from + 1)) {
+      const std::string line = text.substr(from + 1, text.find("\x1b[K", from) - from - 1);
+      CHECK(line.size() < columns);
+      CHECK(line.substr(0, 8) == std::string("tracking").substr(0, columns - 1));
+    }
+  }
+}
+
+TEST_CASE("progress: a cut line ends with a whole character") {
+  for (std::size_t columns = 40; columns < 60; ++columns) {
+    std::ostringstream out;
+    {
+      example::Progress progress(out, "x", 1, true, columns);
+      progress.step("\xe2\x82\xac\xe2\x82\xac\xe2\x82\xac\xe2\x82\xac\xe2\x82\xac\xe2\x82\xac\xe2\x82\xac");
+    }
+    const std::string text = out.str();
+    const std::size_t bytes = static_cast<std::size_t>(std::count_if(
+        text.begin(), text.end(), [](char c) { return (static_cast<unsigned char>(c) & 0x80U) != 0; }));
+    CHECK(bytes % 3 == 0);
+  }
+}
+
+TEST_CASE("progress: COLUMNS says how wide a terminal is at most") {
+  const char* before = std::getenv("COLUMNS");
+  const std::string kept = before != nullptr ? before : "";
+  ::setenv("COLUMNS", "33", 1);
+  CHECK(example::terminal_columns(-1) == 33);
+  CHECK(example::terminal_columns(STDERR_FILENO) <= 33);
+  for (const char* useless : {"", "0", "-5", "wide", "1e3"}) {
+    ::setenv("COLUMNS", useless, 1);
+    CHECK(example::terminal_columns(-1) == 80);
+  }
+  ::unsetenv("COLUMNS");
+  CHECK(example::terminal_columns(-1) == 80);
+  if (before != nullptr) ::setenv("COLUMNS", kept.c_str(), 1);
 }
 
 TEST_CASE("progress: no total and too many steps do no harm") {

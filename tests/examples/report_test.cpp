@@ -126,11 +126,27 @@ TEST_CASE("report of a run: every panel of the main job is there") {
   CHECK(panel_called(data, "Heading error")["y"]["unit"] == "deg");
   CHECK(panel_called(data, "Points and matches")["curves"].size() == 4);
   CHECK(panel_called(data, "Landmarks")["curves"].size() == 1);
-  CHECK(panel_called(data, "Time per stage")["bars"].size() == stereo_slam::stage_names.size());
   CHECK(panel_called(data, "Landmarks and path")["colourings"].size() == 4);
   const auto picture = panel_called(data, "One frame with its matches");
   CHECK(picture["png"].get<std::string>().starts_with("iVBORw0KGgo"));  // the signature of PNG
   CHECK(picture["marks"][1]["count"] == 90);                            // every tenth of 900
+}
+
+TEST_CASE("report of a run: times and threads change nothing in it") {
+  auto run = cairn_test::circular_run(60, 200);
+  const std::string before = stereo_slam::run_report(run, stereo_slam::summarise(run)).data();
+  run.seconds = 77;
+  run.threads = 9;
+  for (auto& frame : run.frames) frame.milliseconds.fill(3);
+  CHECK(stereo_slam::run_report(run, stereo_slam::summarise(run)).data() == before);
+}
+
+TEST_CASE("report of a run: one that ended early says so first") {
+  auto run = cairn_test::straight_run(5);
+  run.notes = {"another note"};
+  run.ended_early = "ended after 5 of 9 frames: the sixth is torn";
+  const auto data = data_of(stereo_slam::run_report(run, stereo_slam::summarise(run)));
+  CHECK(data["notes"][0] == "ended after 5 of 9 frames: the sixth is torn");
 }
 
 TEST_CASE("report of a run: without truth, sample or landmarks the panels say so") {

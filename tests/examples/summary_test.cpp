@@ -127,7 +127,7 @@ TEST_CASE("summary: without a truth the errors are null and the path is the esti
   CHECK(json["path_m"].get<double>() == Approx(29));
 }
 
-TEST_CASE("summary: counts, medians and times are those of the frames") {
+TEST_CASE("summary: counts and medians are those of the frames, and times are not among them") {
   RunRecord run = straight_run(101);
   run.landmarks.resize(17);
   run.frames[3].tracked = run.frames[4].tracked = false;
@@ -136,36 +136,51 @@ TEST_CASE("summary: counts, medians and times are those of the frames") {
   CHECK(json["dataset"] == "straight");
   CHECK(json["store"] == "multi");
   CHECK(json["seed"] == 7);
-  CHECK(json["threads"] == 2);
   CHECK(json["target_points"] == 2000);
   CHECK(json["frames"] == 101);
   CHECK(json["frames_tracked"] == 99);
   CHECK(json["frames_lost"] == 2);
-  CHECK(json["seconds"] == 4.0);
-  CHECK(json["hz"].get<double>() == Approx(101.0 / 4));
+  CHECK(json["ended_early"].is_null());
   CHECK(json["points_left"] == 1050.0);
   CHECK(json["stereo_matches"] == 550.0);
   CHECK(json["map_matches"] == 350.0);
   CHECK(json["inliers"] == 250.0);
   CHECK(json["landmarks"] == 17);
   CHECK(json["notes"][0] == "frame 3 was lost");
+  run.seconds = 5;
+  run.threads = 1;
+  for (auto& frame : run.frames) frame.milliseconds.fill(7);
+  CHECK(json_of(run) == json);
+  run.ended_early = "after frame 100: no more light";
+  CHECK(json_of(run)["ended_early"] == "after frame 100: no more light");
+}
+
+TEST_CASE("timing: what differs from run to run stands here, for the run and for every frame") {
+  const RunRecord run = straight_run(101);
+  const auto json = nlohmann::json::parse(stereo_slam::timing_json(run));
+  CHECK(json["threads"] == 2);
+  CHECK(json["seconds"] == 4.0);
+  CHECK(json["hz"].get<double>() == Approx(101.0 / 4));
   REQUIRE(json["stage_ms"].size() == stereo_slam::stage_names.size());
   for (std::size_t stage = 0; stage < stereo_slam::stage_names.size(); ++stage) {
-    const nlohmann::json& time = json["stage_ms"][stereo_slam::stage_names[stage]];
-    CHECK(time["median"].get<double>() == Approx(50.0 + static_cast<double>(stage)));
-    CHECK(time["p95"].get<double>() == Approx(95.0 + static_cast<double>(stage)));
+    const char* name = stereo_slam::stage_names[stage];
+    CHECK(json["stage_ms"][name]["median"].get<double>() == Approx(50.0 + static_cast<double>(stage)));
+    CHECK(json["stage_ms"][name]["p95"].get<double>() == Approx(95.0 + static_cast<double>(stage)));
+    REQUIRE(json["frame_ms"][name].size() == 101);
+    CHECK(json["frame_ms"][name][30].get<double>() == 30.0 + static_cast<double>(stage));
   }
 }
 
-TEST_CASE("summary: what is not finite becomes null, not invalid JSON") {
+TEST_CASE("timing: what is not finite becomes null, not invalid JSON") {
   RunRecord run = straight_run(5);
   run.seconds = std::numeric_limits<double>::infinity();
-  CHECK(json_of(run)["seconds"].is_null());
+  CHECK(nlohmann::json::parse(stereo_slam::timing_json(run))["seconds"].is_null());
 }
 
 TEST_CASE("summary: a run without frames is refused") {
-  CHECK(cairn_test::message_of([] { (void)summarise(RunRecord{}); }).find("at least one frame") !=
-        std::string::npos);
+  for (const std::string& message : {cairn_test::message_of([] { (void)summarise(RunRecord{}); }),
+                                     cairn_test::message_of([] { (void)stereo_slam::timing(RunRecord{}); })})
+    CHECK(message.find("at least one frame") != std::string::npos);
 }
 
 TEST_SUITE_END();

@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 #include <cstdint>
+#include <filesystem>
+#include <stdexcept>
 #include <string>
 
 #include <doctest/doctest.h>
@@ -97,6 +99,54 @@ TEST_SUITE("netpbm") {
     CHECK(refusal("P5 1 1 100\n\xff").find("samples of at most 100, found 255") != std::string::npos);
     CHECK(refusal("P2 2 1 100\n7 x").find("a sample between 0 and 100 at byte") != std::string::npos);
     CHECK(refusal("P2 3 1 10\n1    2 ").find("a sample") != std::string::npos);
+  }
+
+  TEST_CASE("netpbm: a header is what the format says, to the blank") {
+    const Folder folder;
+    const auto refusal = [&](const std::string& bytes) {
+      folder.put("bad.pgm", bytes);
+      return message_of([&] { static_cast<void>(cairn::read_netpbm(folder / "bad.pgm")); });
+    };
+    CHECK(refusal("P53 2 255\nabcdef").find("and a blank at its start") != std::string::npos);
+    CHECK(refusal("P23 2 255 1 2 3 4 5 6").find("and a blank at its start") != std::string::npos);
+    CHECK(refusal("P5x 2 1 255\nab").find("and a blank at its start") != std::string::npos);
+    CHECK(refusal("P5 +2 1 255\nab").find("found '+2'") != std::string::npos);
+    CHECK(refusal("P5 2 1 255#comment\nab").find("a blank after the largest sample value, at byte 10") !=
+          std::string::npos);
+    CHECK(refusal("P5#c\n2 1 255\nab").empty());
+    CHECK(refusal("P5\t2\r1\n255\tab").empty());
+  }
+
+  TEST_CASE("netpbm: nothing may follow an image but the blanks and comments of a plain one") {
+    const Folder folder;
+    const auto refusal = [&](const std::string& bytes) {
+      folder.put("bad.pgm", bytes);
+      return message_of([&] { static_cast<void>(cairn::read_netpbm(folder / "bad.pgm")); });
+    };
+    CHECK(refusal("P5 2 1 255\nab\n").find("the end of the file after one image, found 1 bytes more") !=
+          std::string::npos);
+    CHECK(refusal("P5 2 1 255\nabP5 2 1 255\ncd").find("found 13 bytes more") != std::string::npos);
+    CHECK(refusal("P5 2 1 255\r\nab").find("found 1 bytes more") != std::string::npos);  // one blank, not two
+    CHECK(refusal("P6 1 1 65535\nabcdefg").find("found 1 bytes more") != std::string::npos);
+    CHECK(refusal("P2 2 1 255\n1 2 3").find("found 1 bytes more") != std::string::npos);
+    CHECK(refusal("P2 2 1 255\n1 2 trailing").find("found 8 bytes more") != std::string::npos);
+    CHECK(refusal("P2 2 1 255\n1 2 \t\r\n# and no more").empty());
+    CHECK(refusal("P3 1 1 255\n1 2 3\n\n").empty());
+  }
+
+  TEST_CASE("netpbm: what would not read back is not written") {
+    const Folder folder;
+    for (const int largest : {1, 100, 255, 256, 1000}) {
+      const Netpbm image{2, 1, 1, largest, {0, static_cast<std::uint16_t>(largest + 1)}};
+      CHECK(message_of([&] { cairn::write_netpbm(folder / "a", image); }) ==
+            (folder / "a").string() + ": not written, expected samples of at most " +
+                std::to_string(largest) + ", found " + std::to_string(largest + 1));
+    }
+    CHECK_FALSE(std::filesystem::exists(folder / "a"));
+    const auto previous = cairn::set_violation_handler(
+        [](const cairn::Violation& violation) { throw std::logic_error(violation.sentence); });
+    CHECK_THROWS_AS(cairn::write_pgm(folder / "a", cairn::ImageView()), std::logic_error);
+    cairn::set_violation_handler(previous);
   }
 
   TEST_CASE("netpbm: every truncation of a valid file is refused, none crashes") {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <span>
 #include <stdexcept>
 #include <string>
@@ -45,6 +46,22 @@ TEST_SUITE("ply") {
     CHECK(cairn_test::message_of([&] {
             cairn::write_ply(folder / "no" / "a.ply", properties);
           }).find("cannot write") != std::string::npos);
+  }
+
+  TEST_CASE("ply: a number that is not finite is refused by name, before anything is written") {
+    const cairn_test::Folder folder;
+    folder.put("old.ply", "of yesterday");
+    const float inf = std::numeric_limits<float>::infinity();
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    const std::vector<float> fine{1, 2, 3}, broken{1, -inf, 3};
+    const std::vector<double> worse{1, 2, nan};
+    const auto refusal = [&](const std::vector<cairn::PlyProperty>& properties) {
+      return cairn_test::message_of([&] { cairn::write_ply(folder / "old.ply", properties); });
+    };
+    CHECK(refusal({{"x", fine}, {"y", broken}}).find("property 'y' of point 1") != std::string::npos);
+    CHECK(refusal({{"x", fine}, {"sigma", worse}}).find("property 'sigma' of point 2") != std::string::npos);
+    CHECK(cairn::read_file(folder / "old.ply") == "of yesterday");
+    CHECK(refusal({{"x", fine}}).empty());
   }
 
   TEST_CASE("ply: columns of unequal size and names with blanks are broken promises") {

@@ -1,11 +1,16 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <clocale>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include <doctest/doctest.h>
 
@@ -111,6 +116,7 @@ TEST_SUITE("trajectory") {
     CHECK(refusal(good + "2 1,5 0 0 0 0 0 1\n").find("('1,5' is none)") != std::string::npos);
     CHECK(refusal(good + "2 0 0 0 0.7 0.7 0.7 0.7\n").find("a quaternion of length 1, not 1.4") !=
           std::string::npos);
+    CHECK(refusal(good + "2 0 0 0 1e150 0 0 0\n").find("not 1e+150, found") != std::string::npos);
     CHECK(refusal(good + "2 0 0 0 0 0 0 0\n").find("a quaternion of length 1") != std::string::npos);
     CHECK(refusal(good + "0.5 0 0 0 0 0 0 1\n").find("times that do not run backwards") != std::string::npos);
     CHECK(refusal("").find("found the end of the file") != std::string::npos);
@@ -156,6 +162,8 @@ TEST_SUITE("trajectory") {
     CHECK(refusal("0.0\n").find("times:1: expected one time for each of the 2 poses") != std::string::npos);
     CHECK(refusal("0.0\n0.1\n0.2\n").find("times:3: expected no more than 2 times") != std::string::npos);
     CHECK(refusal("0.1\n0.0\n").find("backwards") != std::string::npos);
+    CHECK(refusal("0.1\nnan\n").find("times:2: expected a finite number") != std::string::npos);
+    CHECK(refusal("0.1\n0.1\n").empty());
   }
 
   TEST_CASE("trajectory: a write that fails says so and leaves nothing") {
@@ -168,6 +176,67 @@ TEST_SUITE("trajectory") {
           std::string::npos);
     const auto entries = std::filesystem::directory_iterator(folder.path());
     CHECK(std::distance(begin(entries), end(entries)) == 1);
+  }
+
+  TEST_CASE("trajectory: what readers would refuse is refused by writers, before anything is written") {
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    const double inf = std::numeric_limits<double>::infinity();
+    const SE3 here(SO3(), Vector<3>(1, 2, 3));
+    const std::vector<std::pair<Trajectory, std::string>> refused{
+        {{{0, here}, {nan, here}}, "pose 1 of 2 has a time that is not finite"},
+        {{{-inf, here}, {0, here}}, "pose 0 of 2 has a time that is not finite"},
+        {{{0, here}, {1, SE3(SO3(), Vector<3>(0, nan, 0))}}, "pose 1 of 2 has a number that is not finite"},
+        {{{0, SE3(SO3(), Vector<3>(0, 0, inf))}}, "pose 0 of 1 has a number that is not finite"},
+        {{{5, here}, {3, here}, {3, here}, {-1, here}}, "pose 1 of 4 has an earlier time"},
+        {{{5, here}, {5, here}, {std::nextafter(5.0, 0.0), here}}, "pose 2 of 3 has an earlier time"}};
+    const Folder folder;
+    folder.put("old", "the results of yesterday");
+    for (const auto& [trajectory, why] : refused) {
+      CAPTURE(why);
+      for (const auto write : {&cairn::write_tum, &cairn::write_kitti, &cairn::write_euroc}) {
+        const std::string message = message_of([&] { write(folder / "old", trajectory); });
+        CHECK(message.find("old: not written, " + why) != std::string::npos);
+        CHECK_FALSE(message_of([&] { write(folder / "new", trajectory); }).empty());
+      }
+    }
+    CHECK(cairn::read_file(folder / "old") == "the results of yesterday");
+    const auto entries = std::filesystem::directory_iterator(folder.path());
+    CHECK(std::distance(begin(entries), end(entries)) == 1);
+    const Trajectory standing{{5, here}, {5, here}, {6, here}};  // equal times are written as they are read
+    cairn::write_tum(folder / "a", standing);
+    cairn::write_euroc(folder / "b", standing);
+    CHECK(cairn::read_tum(folder / "a").size() == 3);
+    CHECK(cairn::read_euroc(folder / "b").size() == 3);
+  }
+
+  TEST_CASE("trajectory: EuRoC times are the nearest nanosecond, in the file and read back") {
+    const std::uint64_t seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    std::vector<std::int64_t> stamps{0, 1, 289'999'999, 290'000'000, 999'999'999, 1'000'000'001};
+    for (int i = 0; i < 2000; ++i)  // what a double of seconds holds to a fraction of a nanosecond
+      stamps.push_back(static_cast<std::int64_t>(random.below(1'000'000'000'000'000)));
+    std::ranges::sort(stamps);
+    Trajectory trajectory;
+    std::string expected;
+    for (const std::int64_t ns : stamps) {
+      trajectory.push_back({static_cast<double>(ns) / 1e9, SE3()});
+      expected += std::to_string(ns) + ",0,0,0,1,0,0,0\n";
+    }
+    const Folder folder;
+    cairn::write_euroc(folder / "a", trajectory);
+    const std::string text = cairn::read_file(folder / "a");
+    CHECK(text.substr(text.find('\n') + 1) == expected);
+    const Trajectory back = cairn::read_euroc(folder / "a");
+    REQUIRE(back.size() == trajectory.size());
+    for (std::size_t i = 0; i < back.size(); ++i) CHECK(back[i].time == trajectory[i].time);
+    cairn::write_euroc(folder / "b", {{-2.6e-9, SE3()}, {-0.4e-9, SE3()}, {0.6e-9, SE3()}, {2.5e-9, SE3()}});
+    CHECK(cairn::read_file(folder / "b").find("\n-3,0,0,0,1,0,0,0\n0,0,0,0,1,0,0,0\n1,0") !=
+          std::string::npos);
+    for (const double far : {9.3e9, -9.3e9, 1e300})
+      CHECK(message_of([&] { cairn::write_euroc(folder / "c", {{far, SE3()}}); }).find("nanoseconds") !=
+            std::string::npos);
+    CHECK_FALSE(std::filesystem::exists(folder / "c"));
   }
 
   TEST_CASE("trajectory: moved_frame multiplies the body-to-sensor motion on the right") {

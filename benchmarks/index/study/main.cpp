@@ -4,23 +4,26 @@
 // The study of the thesis's chapter 4: a set that grows, in one tree that is rebuilt, in multi-kd-trees of
 // several shapes, and in no tree at all.
 #include <algorithm>
-#include <cstdio>
+#include <array>
 #include <exception>
 #include <filesystem>
-#include <fstream>
 #include <functional>
 #include <iostream>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
+
+#include <cairn/io/file.hpp>
+#include <cairn/version.hpp>
 
 #include "study/analysis.hpp"
 #include "study/report.hpp"
 #include "study/streams.hpp"
 #include "support/progress.hpp"
+#include "support/result_folder.hpp"
 #include "support/scoreboard.hpp"
 
 namespace {
@@ -38,20 +41,30 @@ struct Options {
 constexpr const char* usage =
     "usage: index_study [--quick | --full] [--only points_3|clusters_64|sift_128|surf_64] [--out FOLDER]\n"
     "  --quick   up to 3e5 points and 5e4 descriptors, about three minutes (the default)\n"
-    "  --full    up to 1e7 points and 1e6 descriptors, half an hour\n";
+    "  --full    up to 1e7 points and 1e6 descriptors, half an hour\n"
+    "  --version, --help\n";
 
-std::optional<Options> parse(int argc, char** argv) {
+constexpr std::array<std::string_view, 4> stream_names{"points_3", "clusters_64", "sift_128", "surf_64"};
+
+/// What the command line asks for, or the exit code of the answer to it.
+std::variant<Options, int> parse(int argc, char** argv) {
   Options options;
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i];
-    if (word == "--full" || word == "--quick")
+    if (word == "--full" || word == "--quick") {
       options.full = word == "--full";
-    else if (word == "--only" && i + 1 < argc)
+    } else if (word == "--only" && i + 1 < argc &&
+               std::ranges::find(stream_names, std::string_view(argv[i + 1])) != stream_names.end()) {
       options.only = argv[++i];
-    else if (word == "--out" && i + 1 < argc)
+    } else if (word == "--out" && i + 1 < argc) {
       options.out = argv[++i];
-    else
-      return std::nullopt;
+    } else if (word == "--help" || word == "-h" || word == "--version") {
+      std::cout << (word == "--version" ? "index_study " CAIRN_VERSION_STRING "\n" : usage);
+      return cairn_bench::flush_standard_output("index_study") ? 0 : 1;
+    } else {
+      std::cerr << "index_study: '" << word << "' is no option, or lacks its value\n" << usage;
+      return 2;
+    }
   }
   return options;
 }
@@ -103,11 +116,11 @@ std::vector<Study> run_all(const Options& options) {
   using Make = std::function<std::optional<Stream>()>;
   const bool full = options.full;
   const std::size_t steps = full ? 1000 : 250;
-  const std::vector<std::pair<std::string, Make>> streams{
-      {"points_3", [&] { return cairn_study::uniform_points(full ? 10000000 : 300000, steps); }},
-      {"clusters_64", [&] { return cairn_study::clustered(full ? 1000000 : 50000, steps); }},
-      {"sift_128", [&] { return cairn_study::sift_descriptors(full ? 99000 : 40000, steps); }},
-      {"surf_64", [&] { return cairn_study::arena_descriptors(full ? 0 : 40, steps); }}};
+  const std::vector<std::pair<std::string_view, Make>> streams{
+      {stream_names[0], [&] { return cairn_study::uniform_points(full ? 10000000 : 300000, steps); }},
+      {stream_names[1], [&] { return cairn_study::clustered(full ? 1000000 : 50000, steps); }},
+      {stream_names[2], [&] { return cairn_study::sift_descriptors(full ? 99000 : 40000, steps); }},
+      {stream_names[3], [&] { return cairn_study::arena_descriptors(full ? 0 : 40, steps); }}};
   std::vector<Study> studies;
   for (const auto& [name, make] : streams) {
     if (!options.only.empty() && options.only != name) continue;
@@ -121,25 +134,26 @@ std::vector<Study> run_all(const Options& options) {
   return studies;
 }
 
-void write(const std::filesystem::path& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  if (!(file << text) || !file.flush()) throw std::runtime_error("cannot write " + path.string());
-  std::cout << "  " << path.string() << '\n';
+example::ResultFolder results_in(const std::filesystem::path& folder) {
+  return {folder, {"index_study.json", "index_study.csv", "index_study.html"}};
 }
 
 /// Writes everything; returns how many answers were wrong.
 std::size_t finish(const std::vector<Study>& studies, const Options& options) {
-  std::filesystem::create_directories(options.out);
-  std::cout << "The results are in " << options.out.string() << ":\n";
-  write(options.out / "index_study.json", to_json(studies));
-  write(options.out / "index_study.csv", to_csv(studies));
   const cairn_bench::Context here = cairn_bench::context();
   const std::string subtitle =
       here.cpu + ", one thread; " + here.compiler + "; " + here.flags + (options.full ? "; full" : "; quick");
-  if (const auto page = make_report(studies, subtitle).html())
-    write(options.out / "index_study.html", *page);
-  else
-    std::cout << "  " << example::why_no_report() << '\n';
+  const auto page = make_report(studies, subtitle).html();
+  results_in(options.out).replace([&](const std::filesystem::path& staging) {
+    cairn::write_file_atomically(staging / "index_study.json", to_json(studies));
+    cairn::write_file_atomically(staging / "index_study.csv", to_csv(studies));
+    if (page) cairn::write_file_atomically(staging / "index_study.html", *page);
+  });
+  std::cout << "The results are in " << options.out.string() << ":\n";
+  for (const char* name : {"index_study.json", "index_study.csv", "index_study.html"})
+    if (page || std::string_view(name) != "index_study.html")
+      std::cout << "  " << (options.out / name).string() << '\n';
+  if (!page) std::cout << "  " << example::why_no_report() << '\n';
   std::size_t wrong = 0;
   for (const Study& study : studies)
     for (const auto& result : study.results) wrong += result.drive.wrong;
@@ -149,21 +163,20 @@ std::size_t finish(const std::vector<Study>& studies, const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) try {
-  const std::optional<Options> options = parse(argc, argv);
-  if (!options) {
-    std::cerr << usage;
-    return 2;
-  }
-  const std::vector<Study> studies = run_all(*options);
+  const std::variant<Options, int> asked = parse(argc, argv);
+  if (const int* code = std::get_if<int>(&asked)) return *code;
+  const Options& options = std::get<Options>(asked);
+  results_in(options.out).prepare();
+  const std::vector<Study> studies = run_all(options);
   if (studies.empty()) {
     std::cerr << "index_study: nothing was run\n" << usage;
     return 2;
   }
-  if (const std::size_t wrong = finish(studies, *options); wrong > 0) {
+  if (const std::size_t wrong = finish(studies, options); wrong > 0) {
     std::cerr << "index_study: " << wrong << " answers were wrong\n";
     return 1;
   }
-  return 0;
+  return cairn_bench::flush_standard_output("index_study") ? 0 : 1;
 } catch (const std::exception& error) {
   std::cerr << "index_study: " << error.what() << '\n';
   return 1;

@@ -196,7 +196,10 @@ std::string to_csv(const std::vector<Study>& studies) {
         out << study.stream.name << ',' << '"' << result.drive.name << '"' << ',' << study.grid[i];
         for (const double value : {c.build[i], c.search[i], c.worst[i], c.total[i], c.bytes[i], c.moved[i],
                                    c.distances[i], c.trees[i]})
-          out << ',' << value;
+          if (std::isfinite(value))
+            out << ',' << value;
+          else
+            out << ',';
         out << '\n';
       }
   return out.str();

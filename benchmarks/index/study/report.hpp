@@ -16,7 +16,7 @@ namespace cairn_study {
 /// The page; `subtitle` says on which machine and how it was measured.
 example::Report make_report(const std::vector<Study>& studies, const std::string& subtitle);
 
-/// One line for each stream, store and n.
+/// One line for each stream, store and n; a field is empty where there is no number.
 std::string to_csv(const std::vector<Study>& studies);
 
 /// Exponents, crossings, counters and checks of every store.

@@ -11,6 +11,16 @@
 /// (D. Brown, "Close-range camera calibration", Photogrammetric Engineering 37, 1971; the order of the five
 /// numbers is the one calibration files use.) (x, y) are called normalised coordinates: pixels of an ideal
 /// camera with focal length 1.
+///
+/// Far from the axis a polynomial folds: two rays have one pixel, and which of them was seen cannot be told.
+/// With n = (x, y), r = |n|, p = (p2, p1), q = p . n and g(r) = r (1 + k1 r^2 + k2 r^4 + k3 r^6), (1) is
+/// g(r) n / r + r^2 p + 2 q n. Its derivative is symmetric: g' along n and g / r across, both changed by
+///   2 (q I + p n^T + n p^T),   whose eigenvalues are 2 (2 q +- |p| r), none below -6 |p| r.        (2)
+/// So distortion is the gradient of a potential, which is strictly convex in the disc where g' and g / r stay
+/// above 6 |p| r, and in a convex domain the gradient of a strictly convex function takes no value twice.
+/// A camera is defined on the largest such disc: rays outside have no pixel, and a pixel has the one ray
+/// inside or none. The disc touches the fold, where the derivative ceases to be invertible, on the side that
+/// p points away from; for p = 0 it ends at the fold all around.
 #pragma once
 
 #include <algorithm>
@@ -57,7 +67,11 @@ public:
     if (!(p_.fx > 0 && p_.fy > 0)) raise("PinholeCamera: expected positive focal lengths fx and fy");
     if (p_.width < 0 || p_.height < 0) raise("PinholeCamera: expected an image size that is not negative");
     distorted_ = p_.k1 != 0 || p_.k2 != 0 || p_.p1 != 0 || p_.p2 != 0 || p_.k3 != 0;
-    if (distorted_) largest_radius_squared_ = fold_radius_squared();
+    if (distorted_) {
+      const double radius = disc_radius(), image = farthest_image(radius);
+      largest_radius_squared_ = radius * radius;
+      farthest_image_squared_ = image * image;
+    }
   }
 
   [[nodiscard]] const PinholeParameters& parameters() const noexcept { return p_; }
@@ -77,7 +91,7 @@ public:
   }
 
   /// Pixel of a point in the camera frame. Nothing where the point is not in front of the camera, or so far
-  /// outside the view that the distortion polynomial folds back. The pixel may lie outside the image.
+  /// outside the view that another ray could have the same pixel (2). The pixel may lie outside the image.
   [[nodiscard]] std::optional<Vector<2>> project(const Vector<3>& point) const noexcept {
     const auto normalised = ahead(point);
     if (!normalised) return std::nullopt;
@@ -95,14 +109,11 @@ public:
     return PixelWithJacobian{distort(*normalised), product(distortion_jacobian(*normalised), J)};
   }
 
-  /// Pixel of normalised coordinates. (1)
+  /// Pixel of normalised coordinates, the polynomial as it stands also where project() has no pixel. (1)
   [[nodiscard]] Vector<2> distort(const Vector<2>& normalised) const noexcept {
-    const double x = normalised(0), y = normalised(1);
-    if (!distorted_) return {p_.fx * x + p_.cx, p_.fy * y + p_.cy};
-    const double r2 = x * x + y * y;
-    const double radial = 1 + r2 * (p_.k1 + r2 * (p_.k2 + r2 * p_.k3));
-    return {p_.fx * (x * radial + 2 * p_.p1 * x * y + p_.p2 * (r2 + 2 * x * x)) + p_.cx,
-            p_.fy * (y * radial + p_.p1 * (r2 + 2 * y * y) + 2 * p_.p2 * x * y) + p_.cy};
+    if (!distorted_) return {p_.fx * normalised(0) + p_.cx, p_.fy * normalised(1) + p_.cy};
+    const Bent to = bent(normalised(0), normalised(1));
+    return {p_.fx * to.x + p_.cx, p_.fy * to.y + p_.cy};
   }
 
   /// d distort / d normalised.
@@ -112,36 +123,19 @@ public:
       J << p_.fx, 0, 0, p_.fy;
       return J;
     }
-    const double x = normalised(0), y = normalised(1), r2 = x * x + y * y;
-    const double radial = 1 + r2 * (p_.k1 + r2 * (p_.k2 + r2 * p_.k3));
-    const double slope = 2 * (p_.k1 + r2 * (2 * p_.k2 + r2 * 3 * p_.k3));  // d radial / d(r^2), doubled
-    const double mixed = x * y * slope + 2 * (p_.p1 * x + p_.p2 * y);
-    J << p_.fx * (radial + x * x * slope + 2 * p_.p1 * y + 6 * p_.p2 * x), p_.fx * mixed,  //
-        p_.fy * mixed, p_.fy * (radial + y * y * slope + 6 * p_.p1 * y + 2 * p_.p2 * x);
+    const Bent to = bent(normalised(0), normalised(1));
+    J << p_.fx * to.xx, p_.fx * to.xy, p_.fy * to.xy, p_.fy * to.yy;
     return J;
   }
 
-  /// Normalised coordinates of a pixel: distort() inverted by Newton's method to rounding. Nothing where the
-  /// pixel is not finite or no point in front of the camera projects there.
+  /// Normalised coordinates of a pixel: distort() inverted by Newton's method to rounding, 3 to 6 steps in
+  /// the field of view of a real lens. project() of any point on the ray returns to the pixel. Nothing where
+  /// the pixel is not finite or is that of no ray that project() takes.
   [[nodiscard]] std::optional<Vector<2>> normalise(const Vector<2>& pixel) const noexcept {
     const Vector<2> target((pixel(0) - p_.cx) / p_.fx, (pixel(1) - p_.cy) / p_.fy);
     if (!(std::isfinite(target(0)) && std::isfinite(target(1)))) return std::nullopt;
     if (!distorted_) return target;
-    Vector<2> n = target;
-    constexpr int most_steps = 30;  // 3 to 6 in the field of view of a real lens
-    for (int step = 0; step < most_steps; ++step) {
-      const Vector<2> image = distort(n);
-      const double ex = (image(0) - p_.cx) / p_.fx - target(0), ey = (image(1) - p_.cy) / p_.fy - target(1);
-      const Matrix<2> J = distortion_jacobian(n);
-      const double a = J(0, 0) / p_.fx, b = J(0, 1) / p_.fx, c = J(1, 0) / p_.fy, d = J(1, 1) / p_.fy;
-      const double determinant = a * d - b * c;
-      if (!(determinant > 0)) return std::nullopt;  // past the fold
-      const double dx = (d * ex - b * ey) / determinant, dy = (a * ey - c * ex) / determinant;
-      n -= Vector<2>(dx, dy);
-      if (!(n.squaredNorm() <= largest_radius_squared_)) return std::nullopt;
-      if (dx * dx + dy * dy <= 1e-28 * (1 + n.squaredNorm())) return n;
-    }
-    return std::nullopt;
+    return straightened(target(0), target(1));
   }
 
   /// normalise() with the derivative of the pixel there.
@@ -167,37 +161,133 @@ private:
     return n;
   }
 
-  // Smallest s = r^2 > 0 where d(r radial)/dr = 1 + 3 k1 s + 5 k2 s^2 + 7 k3 s^3 vanishes: beyond it the
-  // image of a ray turns back towards the centre. The cubic is monotone between the roots of its derivative.
-  [[nodiscard]] double fold_radius_squared() const noexcept {
-    const double a = 3 * p_.k1, b = 5 * p_.k2, c = 7 * p_.k3;
-    const auto slope = [&](double s) { return 1 + s * (a + s * (b + s * c)); };
-    constexpr double far = 1e6;  // rays within 0.06 degrees of the image plane: no lens
-    std::array<double, 4> knots{0, far, far, far};
-    const double discriminant = b * b - 3 * a * c;  // of a + 2 b s + 3 c s^2
-    if (c != 0 && discriminant >= 0) {
-      const double root = std::sqrt(discriminant);
-      knots[1] = std::min((-b - root) / (3 * c), (-b + root) / (3 * c));
-      knots[2] = std::max((-b - root) / (3 * c), (-b + root) / (3 * c));
-    } else if (c == 0 && b != 0) {
-      knots[1] = -a / (2 * b);
+  // (1) for focal length 1 and its derivative, which is symmetric.
+  struct Bent {
+    double x, y;
+    double xx, xy, yy;
+  };
+  [[nodiscard]] Bent bent(double x, double y) const noexcept {
+    const double r2 = x * x + y * y, px = p_.p2 * x, py = p_.p1 * y, q = px + py;
+    const double radial = 1 + r2 * (p_.k1 + r2 * (p_.k2 + r2 * p_.k3)), across = radial + 2 * q;
+    const double slope = 2 * (p_.k1 + r2 * (2 * p_.k2 + r2 * 3 * p_.k3));  // d radial / d(r^2), doubled
+    return {x * across + p_.p2 * r2, y * across + p_.p1 * r2, across + x * x * slope + 4 * px,
+            x * y * slope + 2 * (p_.p1 * x + p_.p2 * y), across + y * y * slope + 4 * py};
+  }
+
+  // The n of the disc that is bent to the target. Steps are halved until they stay in the disc and come
+  // nearer: the derivative is positive definite there, so that the full step is taken near the solution and
+  // no step is refused for ever but where there is none.
+  [[nodiscard]] std::optional<Vector<2>> straightened(double u, double v) const noexcept {
+    const double squared = u * u + v * v;
+    if (!(squared <= farthest_image_squared_)) return std::nullopt;
+    // Wider than the disc by less than its derivative at the rim allows: rounding must not lose rays there.
+    const double widest = largest_radius_squared_ * (1 + 1e-9);
+    double x = u, y = v;
+    if (squared > largest_radius_squared_) {
+      const double shrunk = 0.9 * std::sqrt(largest_radius_squared_ / squared);
+      x *= shrunk;
+      y *= shrunk;
     }
-    for (double& knot : knots) knot = std::isfinite(knot) ? std::min(std::max(knot, 0.0), far) : far;
-    for (std::size_t i = 0; i < 3; ++i) {
-      double low = knots[i], high = knots[i + 1];
-      if (slope(high) > 0) continue;
-      for (int step = 0; step < 100; ++step) {
-        const double middle = 0.5 * (low + high);
-        (slope(middle) > 0 ? low : high) = middle;
+    Bent at = bent(x, y);
+    constexpr int most_steps = 50;
+    for (int step = 0; step < most_steps; ++step) {
+      const double ex = at.x - u, ey = at.y - v, error = ex * ex + ey * ey;
+      const double determinant = at.xx * at.yy - at.xy * at.xy;
+      if (!(determinant > 0)) return std::nullopt;
+      const double dx = (at.yy * ex - at.xy * ey) / determinant, dy = (at.xx * ey - at.xy * ex) / determinant;
+      // What a step leaves is its own square over the distance to the fold: nothing, after one so short.
+      if (dx * dx + dy * dy <= 1e-17 * std::min(determinant, 1.0) * (x * x + y * y))
+        return inside(x - dx, y - dy);
+      for (double share = 1;; share *= 0.5) {
+        const double next_x = x - share * dx, next_y = y - share * dy;
+        if (next_x * next_x + next_y * next_y <= widest) {
+          const Bent next = bent(next_x, next_y);
+          const double left_x = next.x - u, left_y = next.y - v;
+          if (left_x * left_x + left_y * left_y < error) {
+            x = next_x;
+            y = next_y;
+            at = next;
+            break;
+          }
+        }
+        if (share < 1e-6) {  // no nearer: at the solution to rounding, or at the rim before one outside
+          constexpr double rounding = 1e-15;
+          if (error <= rounding * rounding * (1 + squared)) return inside(x, y);
+          return std::nullopt;
+        }
       }
-      return low;
     }
-    return far;
+    return std::nullopt;
+  }
+
+  // A solution beyond the rim by rounding is moved onto it, so that project() takes it.
+  [[nodiscard]] Vector<2> inside(double x, double y) const noexcept {
+    const double squared = x * x + y * y, most = largest_radius_squared_ * (1 - 1e-15);
+    const double scale = squared <= most ? 1 : std::sqrt(most / squared);
+    return {scale * x, scale * y};
+  }
+
+  static constexpr double farthest = 1e3;  // rays within 0.06 degrees of the image plane: no lens
+
+  // Where g' or g / r first comes down to 6 |p| r, and 1e-5 more: there the ray of a pixel is known to 1e-11.
+  [[nodiscard]] double disc_radius() const noexcept {
+    constexpr double least = 1e-5;
+    const double fall = 6 * std::hypot(p_.p1, p_.p2);
+    const double along = first_zero({1 - least, -fall, 3 * p_.k1, 0, 5 * p_.k2, 0, 7 * p_.k3});
+    const double across = first_zero({1 - least, -fall, p_.k1, 0, p_.k2, 0, p_.k3});
+    return std::min(along, across);
+  }
+
+  // No pixel of the disc of this radius is farther from the principal point, in focal lengths: g is largest
+  // at the rim.
+  [[nodiscard]] double farthest_image(double r) const noexcept {
+    const double s = r * r, radial = 1 + s * (p_.k1 + s * (p_.k2 + s * p_.k3));
+    const double image = (r * radial + 3 * std::hypot(p_.p1, p_.p2) * s) * (1 + 1e-9);
+    return image >= 0 ? image : 0;  // not a number where coefficients overflow
+  }
+
+  // The first r in (0, farthest] where the polynomial with these coefficients, positive at 0, no longer is;
+  // `farthest` where it stays so, 0 where coefficients overflow. Between the zeros of its derivative a
+  // polynomial has one zero at most: found by bisection, from the highest derivative down.
+  [[nodiscard]] static double first_zero(const std::array<double, 7>& coefficients) noexcept {
+    constexpr std::size_t degree = 6;
+    std::array<double, degree + 2> knots{0, farthest};
+    std::size_t count = 2;
+    for (std::size_t order = degree; order-- > 0;) {
+      std::array<double, degree + 1> c{};  // of the derivative of this order
+      for (std::size_t i = order; i <= degree; ++i) {
+        c[i - order] = coefficients[i];
+        for (std::size_t k = 0; k < order; ++k) c[i - order] *= static_cast<double>(i - k);
+      }
+      const auto positive = [&](double r) {
+        double value = 0;
+        for (std::size_t i = degree + 1; i-- > 0;) value = value * r + c[i];
+        return value > 0;
+      };
+      if (order == 0 && !positive(0)) return 0;
+      std::array<double, degree + 2> zeros{0};
+      std::size_t found = 1;
+      for (std::size_t i = 0; i + 1 < count; ++i) {
+        double low = knots[i], high = knots[i + 1];
+        const bool before = positive(low);
+        if (positive(high) == before) continue;
+        for (int step = 0; step < 70; ++step) {
+          const double middle = 0.5 * (low + high);
+          (positive(middle) == before ? low : high) = middle;
+        }
+        zeros[found++] = low;
+      }
+      zeros[found++] = farthest;
+      knots = zeros;
+      count = found;
+    }
+    return knots[1];
   }
 
   PinholeParameters p_;
   bool distorted_ = false;
-  double largest_radius_squared_ = std::numeric_limits<double>::infinity();
+  double largest_radius_squared_ = std::numeric_limits<double>::max();  // not infinity, nor what overflows
+  double farthest_image_squared_ = std::numeric_limits<double>::max();
 };
 
 }  // namespace cairn::inline CAIRN_ABI

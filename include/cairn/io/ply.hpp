@@ -9,6 +9,7 @@
 #pragma once
 
 #include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -16,6 +17,7 @@
 #include <iterator>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <variant>
 #include <vector>
 
@@ -54,10 +56,22 @@ void append_little_endian(std::string& bytes, Value value) {
     bytes.append(raw, sizeof raw);
 }
 
+/// Throws Error naming the first number that is not finite: viewers differ in what they make of it.
+inline void expect_finite(const PlyProperty& property) {
+  const auto check = [&](const auto& values) {
+    if constexpr (std::is_floating_point_v<std::decay_t<decltype(values[0])>>)
+      for (std::size_t i = 0; i < values.size(); ++i)
+        if (!std::isfinite(values[i]))
+          raise("PLY: expected finite numbers, property '" + property.name + "' of point " +
+                std::to_string(i) + " is none");
+  };
+  std::visit(check, property.values);
+}
+
 }  // namespace detail
 
 /// The bytes of a PLY file with one vertex a point. All properties have the same size; comments are single
-/// lines. The same input gives the same bytes on every platform.
+/// lines. The same input gives the same bytes on every platform. Throws Error where a number is not finite.
 [[nodiscard]] inline std::string ply_bytes(std::span<const PlyProperty> properties,
                                            std::span<const std::string> comments = {}) {
   CAIRN_EXPECTS(!properties.empty(), "a point cloud needs at least one property");
@@ -72,6 +86,7 @@ void append_little_endian(std::string& bytes, Value value) {
     CAIRN_EXPECTS(property.size() == count, "all properties have one value a point");
     CAIRN_EXPECTS(!property.name.empty() && property.name.find_first_of(" \t\r\n") == std::string::npos,
                   "a property's name has no blanks");
+    detail::expect_finite(property);
     bytes += std::string("property ") + detail::ply_type(property) + " " + property.name + "\n";
   }
   bytes += "end_header\n";
@@ -82,7 +97,8 @@ void append_little_endian(std::string& bytes, Value value) {
   return bytes;
 }
 
-/// Writes ply_bytes(properties, comments) completely or not at all. Throws Error naming the path.
+/// Writes ply_bytes(properties, comments) completely or not at all. Throws Error naming the path, or before
+/// anything is written as ply_bytes does.
 inline void write_ply(const std::filesystem::path& path, std::span<const PlyProperty> properties,
                       std::span<const std::string> comments = {}) {
   write_file_atomically(path, ply_bytes(properties, comments));

@@ -52,6 +52,14 @@ void append_number(std::string& text, Number value) {
   text.append(buffer, end);
 }
 
+/// The number as append_number writes it: for messages, where 1e300 is not to take 300 digits.
+template <class Number>
+[[nodiscard]] std::string shortest(Number value) {
+  std::string text;
+  append_number(text, value);
+  return text;
+}
+
 /// The lines of a text file, with the place of the current one for messages. Accepts LF and CR LF, with or
 /// without a last line end.
 class TextLines {

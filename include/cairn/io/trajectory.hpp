@@ -14,8 +14,10 @@
 /// backwards. Equal times in neighbouring lines are accepted: published ground truth has them. Quaternions
 /// and matrices are normalised on reading; files carry three to nine digits of them.
 ///
-/// Writers are atomic and byte-deterministic; numbers are the shortest that read back to the same bits.
-/// Linear time; the file is held in memory once.
+/// Writers refuse what readers would: numbers that are not finite and times that run backwards throw Error
+/// naming the pose before anything is written; also in KITTI's format, whose rows are in the order of time.
+/// (An empty trajectory is written, and then refused by readers.) Writers are atomic and byte-deterministic;
+/// numbers are the shortest that read back to the same bits. Linear time; the file is held in memory once.
 #pragma once
 
 #include <cmath>
@@ -54,8 +56,7 @@ inline SE3 pose_of_quaternion(const TextLines& lines, const double* position, do
                               double z) {
   constexpr double tolerance = 0.01;  // three printed digits leave 0.001
   const double length = std::sqrt(w * w + x * x + y * y + z * z);
-  if (std::abs(length - 1.0) > tolerance)
-    lines.fail("a quaternion of length 1, not " + std::to_string(length));
+  if (std::abs(length - 1.0) > tolerance) lines.fail("a quaternion of length 1, not " + shortest(length));
   return SE3(SO3::from_quaternion(w, x, y, z), Vector<3>(position[0], position[1], position[2]));
 }
 
@@ -81,6 +82,23 @@ void for_each_kitti_row(const std::filesystem::path& path, Use&& use) {
     use(lines, row);
   }
   if (!any) lines.fail(std::string("at least one line of ") + expected);
+}
+
+/// Throws Error naming the file and the first pose that no file should hold.
+inline void expect_writable(const std::filesystem::path& path, const Trajectory& trajectory) {
+  for (std::size_t i = 0; i < trajectory.size(); ++i) {
+    const auto refuse = [&](const std::string& why) {
+      raise(path.string() + ": not written, pose " + std::to_string(i) + " of " +
+            std::to_string(trajectory.size()) + " has " + why);
+    };
+    const StampedPose& pose = trajectory[i];
+    const Vector<3>& t = pose.T_world_body.translation();
+    const SO3& q = pose.T_world_body.rotation();
+    if (!std::isfinite(pose.time)) refuse("a time that is not finite");
+    for (const double number : {t(0), t(1), t(2), q.w(), q.x(), q.y(), q.z()})
+      if (!std::isfinite(number)) refuse("a number that is not finite");
+    if (i > 0 && pose.time < trajectory[i - 1].time) refuse("an earlier time than the one before");
+  }
 }
 
 inline void append_numbers(std::string& text, const double* numbers, std::size_t count, char separator) {
@@ -178,6 +196,7 @@ inline void append_numbers(std::string& text, const double* numbers, std::size_t
 
 /// Writes a TUM file, completely or not at all. Throws Error.
 inline void write_tum(const std::filesystem::path& path, const Trajectory& trajectory) {
+  detail::expect_writable(path, trajectory);
   std::string text;
   for (const StampedPose& pose : trajectory) {
     const Vector<3>& t = pose.T_world_body.translation();
@@ -191,6 +210,7 @@ inline void write_tum(const std::filesystem::path& path, const Trajectory& traje
 
 /// Writes a KITTI pose file, completely or not at all; the format has no times. Throws Error.
 inline void write_kitti(const std::filesystem::path& path, const Trajectory& trajectory) {
+  detail::expect_writable(path, trajectory);
   std::string text;
   for (const StampedPose& pose : trajectory) {
     const Eigen::Matrix<double, 4, 4, Eigen::RowMajor> rows = pose.T_world_body.matrix();
@@ -200,8 +220,15 @@ inline void write_kitti(const std::filesystem::path& path, const Trajectory& tra
   write_file_atomically(path, text);
 }
 
-/// Writes the first 8 columns of a EuRoC file, completely or not at all. Throws Error.
+/// Writes the first 8 columns of a EuRoC file, completely or not at all. Times are rounded to the nearest
+/// nanosecond; those of more than 292 years before or after their origin do not fit and throw Error, as all
+/// that expect_writable refuses.
 inline void write_euroc(const std::filesystem::path& path, const Trajectory& trajectory) {
+  detail::expect_writable(path, trajectory);
+  for (const StampedPose& pose : trajectory)
+    if (std::abs(pose.time) >= 9.2e9)
+      raise(path.string() + ": not written, a time of " + shortest(pose.time) +
+            " s is no number of nanoseconds");
   std::string text = "#timestamp [ns],p_x [m],p_y [m],p_z [m],q_w,q_x,q_y,q_z\n";
   for (const StampedPose& pose : trajectory) {
     const Vector<3>& t = pose.T_world_body.translation();

@@ -1,7 +1,7 @@
 // The page: title, key figures, notes and panels, from the JSON in the element "data".
 import { cloud } from './cloud.js';
 import { element } from './dom.js';
-import { bars, picture, table } from './plain.js';
+import { picture, table } from './plain.js';
 import { lines, plane } from './plots.js';
 import { startTheme, toggleTheme } from './theme.js';
 
@@ -9,7 +9,6 @@ const kinds = {
   lines: { draw: lines, empty: (panel) => panel.curves.length === 0 || panel.x_values.length === 0 },
   plane: { draw: plane, empty: (panel) => panel.curves.every((curve) => curve.x.length === 0) },
   picture: { draw: picture, empty: (panel) => panel.png === '' },
-  bars: { draw: bars, empty: (panel) => panel.bars.length === 0 },
   table: { draw: table, empty: (panel) => panel.rows.length === 0 },
   cloud: { draw: cloud, empty: (panel) => panel.points === '' && panel.curves.every((curve) => curve.points === '') },
 };

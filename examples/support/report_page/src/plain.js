@@ -1,5 +1,5 @@
-// Panels that need no library: pictures with marks, bars, tables.
-import { element, floats, readable, switchable } from './dom.js';
+// Panels that need no library: pictures with marks, tables.
+import { element, floats, switchable } from './dom.js';
 
 const svgSpace = 'http://www.w3.org/2000/svg';
 
@@ -36,20 +36,6 @@ export function picture(panel, body) {
   });
   const image = element('img', { alt: panel.title, width: panel.width, height: panel.height, src: `data:image/png;base64,${panel.png}` });
   body.append(element('div', { className: 'picture' }, image, svg), element('div', { className: 'bar onpicture' }, ...keys));
-}
-
-export function bars(panel, body) {
-  const largest = panel.bars.reduce((most, bar) => Math.max(most, bar.value ?? 0, bar.upper ?? 0), 0) || 1;
-  const share = (value) => `${(100 * Math.max(0, value ?? 0)) / largest}%`;
-  const rows = panel.bars.flatMap((bar) => [
-    element('span', {}, bar.name),
-    element('div', { className: 'track' },
-      element('i', { className: 'upper', style: { width: share(bar.upper) } }),
-      element('i', { style: { width: share(bar.value) } })),
-    element('output', {}, `${readable(bar.value)} / ${readable(bar.upper)}`),
-  ]);
-  const caption = element('span', { style: { color: 'var(--soft)' } }, `${panel.value_name} / ${panel.upper_name} [${panel.unit}]`);
-  body.append(element('div', { className: 'bars' }, ...rows), element('div', { className: 'bar' }, element('span', { className: 'spread' }), caption));
 }
 
 export function table(panel, body) {

@@ -1,0 +1,28 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+// EuRoC trajectories: what is read is a trajectory, and a written one reads back to the nanosecond.
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include <cairn/core/check.hpp>
+#include <cairn/io/trajectory.hpp>
+
+#include "fuzz/scratch.hpp"
+#include "fuzz/trajectory_checks.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const cairn_fuzz::Scratch scratch;
+  try {
+    const cairn::Trajectory read = cairn::read_euroc(scratch.put("a", cairn_fuzz::text_of(data, size)));
+    cairn_fuzz::check_trajectory(read);
+    cairn::write_euroc(scratch / "b", read);  // refuses times that are no number of nanoseconds
+    const double last = std::max(std::abs(read.front().time), std::abs(read.back().time));
+    cairn_fuzz::check_same(read, cairn::read_euroc(scratch / "b"), 0.5e-9 + 4e-16 * last);
+  } catch (const cairn::Error&) {
+    return 0;
+  }
+  return 0;
+}
