@@ -30,6 +30,10 @@ inline constexpr S rounding_share = S(64) * std::numeric_limits<S>::epsilon();
 template <class S>
 inline constexpr S digits_left = S(4096) * std::numeric_limits<S>::epsilon();
 
+/// The same for a root of a sum of squares, by reflections: they lose less.
+template <class S>
+inline constexpr S root_digits_left = S(1024) * std::numeric_limits<S>::epsilon();
+
 /// root root^T = a for a covariance of any rank: one column for each direction with variance, zeros after them.
 /// Not triangular, but row order(k), the k-th pivot, has nothing after column k.
 template <int N, class S>

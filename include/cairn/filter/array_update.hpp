@@ -64,7 +64,7 @@ template <int N, int M, class S, class Array>
     for (int k = 0; k <= i; ++k) variance += out.root_s(i, k) * out.root_s(i, k);
     for (int k = 0; k < i; ++k) y(i) -= out.root_s(i, k) * y(k);
     const S head = out.root_s(i, i);
-    out.regular = out.regular && head > digits_left<S> * sqrt(variance);
+    out.regular = out.regular && head > root_digits_left<S> * sqrt(variance);
     if (head * head < least_share * variance) least_share = head * head / variance;
     y(i) /= head;
     if (out.regular) log_root += log(head);
@@ -89,7 +89,7 @@ enum class KeptAs { covariance, root };
 template <int N, int M, class S>
 [[nodiscard]] bool determined(const ArrayUpdate<N, M, S>& update, const Matrix<N, N, S>& lower,
                               const Matrix<M, N, S>& h, const Matrix<M, M, S>& r, KeptAs kept,
-                              S digits = digits_left<S>) {
+                              S digits = root_digits_left<S>) {
   using std::abs;
   using std::sqrt;
   const int n = static_cast<int>(lower.rows()), m = static_cast<int>(h.rows());
@@ -136,7 +136,7 @@ template <int N, int M, class S>
       for (int k = j; k < m; ++k) entry += update.white(i, k) * noise(k, j);
       of_noise += abs(entry);
     }
-    const S least = digits_left<S> * sigma(i), left = deviation(update.root, i);
+    const S least = root_digits_left<S> * sigma(i), left = deviation(update.root, i);
     if (!shrinks(of_state, of_noise, left > least ? left : least)) return false;
   }
   return true;

@@ -208,7 +208,7 @@ template <class Q>
 [[gnu::always_inline]] [[nodiscard]] inline bool eliminates(const Q& q) {
   using S = typename Q::Scalar;
   constexpr int n = Q::row_count;
-  static constexpr auto filled = filled_below<Q, n>();
+  [[maybe_unused]] static constexpr auto filled = filled_below<Q, n>();
   S a[n][n]{};  // a[j][i] = Q(i, j) on and below the diagonal
   unrolled<Q::entries.size()>([&](auto e) __attribute__((always_inline)) {
     constexpr Entry entry = Q::entries[e];

@@ -73,7 +73,7 @@ template <Manifold X, int M, class Array>
                                                           const Matrix<M, dof<X>, ScalarOf<X>>& h,
                                                           const Matrix<M, M, ScalarOf<X>>& r, double gate,
                                                           bool good,
-                                                          ScalarOf<X> digits = digits_left<ScalarOf<X>>) {
+                                                          ScalarOf<X> digits = root_digits_left<ScalarOf<X>>) {
   using S = ScalarOf<X>;
   const int m = static_cast<int>(residual.size());
   auto in = fresh_innovation<M, S>(residual, Matrix<M, M, S>::Zero(m, m));
