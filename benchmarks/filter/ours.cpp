@@ -40,7 +40,7 @@ double batch_of_1000(int rounds) {
   const cairn::Matrix<3> q = Still{}.q;
   std::size_t kept = 0;
   for (int k = 0; k < rounds; ++k) {
-    cairn::BatchKalman{}.drift(batch, q);
+    static_cast<void>(cairn::BatchKalman{}.drift(batch, q));
     kept += cairn::BatchKalman{}.update(batch, seen);
   }
   if (kept != 1000U * static_cast<std::size_t>(rounds)) fail("a lane of the batch was refused");

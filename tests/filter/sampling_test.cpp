@@ -46,7 +46,7 @@ TEST_SUITE("batch") {
     }
     const Matrix<3, 3, S> f = cairn_test::random_matrix<3, 3, S>(random);
     const Matrix<3, 3, S> q = cairn_test::random_covariance<3, S>(random);
-    cairn::BatchKalman{}.predict(batch, f, q);
+    REQUIRE(cairn::BatchKalman{}.predict(batch, f, q) == Status::accepted);
     std::vector<std::uint8_t> kept(53);
     const std::size_t count = cairn::BatchKalman{.gate = 4.0}.update(batch, seen, kept);
     std::size_t expected = 0;

@@ -92,8 +92,8 @@ template <int R, int C, int K, class S>
 void add_transposed_product(Matrix<R, C, S>& to, const Matrix<K, R, S>& a, const Matrix<K, C, S>& b,
                             S weight = S(1)) {
   const Matrix<R, C, S> sum = transposed_product(a, b);
-  for (int c = 0; c < C; ++c)
-    for (int r = 0; r < R; ++r) to(r, c) += weight * sum(r, c);
+  for (Eigen::Index c = 0; c < sum.cols(); ++c)
+    for (Eigen::Index r = 0; r < sum.rows(); ++r) to(r, c) += weight * sum(r, c);
 }
 
 /// A^T, entry by entry: gcc 12 calls a matrix that is constructed from an Eigen transpose uninitialised.
@@ -117,8 +117,8 @@ template <int R, int C, int Rows, int Columns, class S>
 /// Writes `part` into a matrix from this row and column on.
 template <int Rows, int Columns, int R, int C, class S>
 void put(Matrix<Rows, Columns, S>& to, int row, int column, const Matrix<R, C, S>& part) {
-  for (int j = 0; j < C; ++j)
-    for (int i = 0; i < R; ++i) to(row + i, column + j) = part(i, j);
+  for (Eigen::Index j = 0; j < part.cols(); ++j)
+    for (Eigen::Index i = 0; i < part.rows(); ++i) to(row + i, column + j) = part(i, j);
 }
 
 /// Whether every number is finite.

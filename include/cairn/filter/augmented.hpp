@@ -85,6 +85,21 @@ struct PointPairs {
   }
   [[nodiscard]] int rows() const { return static_cast<int>(shift.size()); }
 
+  /// The roots of covariance() and moment(), as rows of an array from column `first` on: odd / c, even / c and
+  /// sqrt(extra) m, see sigma_rows().
+  template <class Array>
+  void to_rows(Array& array, int first, const S& c, const S& extra) const {
+    using std::sqrt;
+    const int pairs = static_cast<int>(odd.cols());
+    for (int j = 0; j < rows(); ++j) {
+      for (int k = 0; k < pairs; ++k) {
+        array(k, first + j) = odd(j, k) / c;
+        array(pairs + k, first + j) = even(j, k) / c;
+      }
+      array(2 * pairs, first + j) = shift(j) == S(0) ? S(0) : sqrt(extra) * shift(j);
+    }
+  }
+
 private:
   [[nodiscard]] Y point(int column, const S& sign) const {
     Tangent<Y> step = shift;
@@ -292,10 +307,40 @@ private:
       v = -v;
       seen.set(i, up, detail::sensed(sensor, prior.center, v));
     }
+    constexpr int n = dof<X>, m = dof<Z>;
     const S w = S(1) / (c * c);
     seen.shift *= w;
-    return detail::correct_by_moments<X, dof<Z>>(belief, prior.moment(seen, w, extra<S>()),
-                                                 seen.covariance(w, extra<S>()), local(seen.mean(), z), gate);
+    auto in = detail::fresh_innovation<m, S>(local(seen.mean(), z), seen.covariance(w, extra<S>()));
+    const Matrix<n, m, S> cross = prior.moment(seen, w, extra<S>());
+    const S digits =
+        detail::digits_of_points(belief.mean, belief.covariance, seen.center, in.covariance);
+    const auto by_array = [&](detail::ArrayUpdate<n, m, S>& update) {
+      constexpr int rows = K == dynamic ? dynamic : 2 * K + 1;
+      constexpr int size = detail::size_sum<m, n>;
+      Matrix<rows, size, S> array = Matrix<rows, size, S>::Zero(2 * all + 1, seen.rows() + prior.rows());
+      seen.to_rows(array, 0, c, extra<S>());
+      prior.to_rows(array, seen.rows(), c, extra<S>());
+      if (!all_finite(array)) return Status::not_positive_definite;
+      Matrix<rows, size, S> by_state = array;  // the state's columns first: [L^T, (H L)^T; 0, *]
+      const int ns = prior.rows(), ms = seen.rows();
+      for (int k = 0; k <= 2 * all; ++k) {
+        for (int j = 0; j < ns; ++j) by_state(k, j) = array(k, ms + j);
+        for (int j = 0; j < ms; ++j) by_state(k, ns + j) = array(k, j);
+      }
+      Matrix<m, m, S> in_z = Matrix<m, m, S>::Zero(ms, ms);  // variances that the sensor's noise makes
+      for (int j = 0; j < ms; ++j)
+        for (int k = count; k < all; ++k)
+          in_z(j, j) += array(k, j) * array(k, j) + array(all + k, j) * array(all + k, j);
+      detail::triangularise(by_state);
+      const CovarianceOf<X> root = detail::lower_part<CovarianceOf<X>>(by_state, 0, ns);
+      const Matrix<m, n, S> slope = detail::mean_slope<m, n, S>(by_state, root, ms, ns);
+      update = detail::update_by_array<n, m, S>(array, in.residual, ns);
+      const bool good = update.regular &&
+                        detail::determined<n, m, S>(update, root, slope, in_z, detail::KeptAs::covariance, digits);
+      return good ? Status::accepted : Status::not_positive_definite;
+    };
+    detail::correct_by_moments<X, m, S>(belief, cross, in, gate, digits, by_array);
+    return in;
   }
 
   template <class H>

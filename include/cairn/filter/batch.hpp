@@ -6,7 +6,8 @@
 ///
 /// A batch keeps its beliefs in blocks of as many filters as a register has lanes, number by number, so that
 /// one instruction serves a whole block. The arithmetic is that of Kalman (L D L^T of S, then P - W W^T on
-/// the lower triangle); every lane decides for itself whether its measurement is kept.
+/// the lower triangle); every lane decides for itself whether its measurement is kept, and one whose digits
+/// that would cost is done again by itself (array_update.hpp).
 #pragma once
 
 #include <cstddef>
@@ -16,9 +17,12 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/correct.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kernels.hpp>
+#include <cairn/filter/status.hpp>
 #include <cairn/filter/structure.hpp>
 #include <cairn/version.hpp>
 
@@ -98,17 +102,21 @@ private:
 struct BatchKalman {
   double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
 
-  /// Adds the process noise Q to every belief: states that stand still but for a random walk. O(size).
+  /// Adds the process noise Q to every belief: states that stand still but for a random walk. Refused, and
+  /// nothing changed: a Q that is no covariance. O(size).
   template <int N, class S>
-  void drift(GaussianBatch<N, S>& batch, const Matrix<N, N, S>& q) const {
+  Status drift(GaussianBatch<N, S>& batch, const Matrix<N, N, S>& q) const {
+    if (const Status status = detail::judge_noise<N, S>(q); status != Status::accepted) return status;
     for (auto& block : batch.blocks())
       for (int i = 0; i < N; ++i)
         for (int j = 0; j <= i; ++j) block.covariance[batch.place(i, j)] += q(i, j);
+    return Status::accepted;
   }
 
-  /// x <- F x, P <- F P F^T + Q for every belief, the same F (a Matrix or Structured) and Q.
+  /// x <- F x, P <- F P F^T + Q for every belief, the same F (a Matrix or Structured) and Q. Refused, and
+  /// nothing changed: a Q that is no covariance, an F that is not finite.
   template <int N, class S, class F>
-  void predict(GaussianBatch<N, S>& batch, const F& f, const Matrix<N, N, S>& q) const;
+  Status predict(GaussianBatch<N, S>& batch, const F& f, const Matrix<N, N, S>& q) const;
 
   /// Belief i takes in measurement i = N(z_i, R_i) of all its states (H = I). Returns how many were kept;
   /// `kept`, where given, gets a 1 or 0 for each. Throws Error where the sizes differ. A lane whose numbers
@@ -120,7 +128,14 @@ struct BatchKalman {
 
 namespace detail {
 
-/// One block: P and x with z and R; returns the mask of kept lanes (all bits set, or zero).
+/// Which lanes of a block took their measurement in, and which would have lost their digits (all bits set, or
+/// zero).
+template <class Mask>
+struct BlockVerdict {
+  Mask good, doubtful;
+};
+
+/// One block: P and x with z and R.
 template <int N, class S>
 [[gnu::always_inline]] inline auto update_block(typename GaussianBatch<N, S>::Block& belief,
                                                 const typename GaussianBatch<N, S>::Block& seen, S gate) {
@@ -137,6 +152,7 @@ template <int N, class S>
       lower[i][j] = belief.covariance[Batch::place(i, j)] + seen.covariance[Batch::place(i, j)];
     }
   }
+  constexpr S least = S(4) * digits_left<S>;
   Lane nis = y[0] * S(0);
   auto good = nis == nis;
   for (int m = 0; m < N; ++m) {
@@ -150,7 +166,12 @@ template <int N, class S>
       for (int k = 0; k < N; ++k) w[i][k] -= factor * w[m][k];
     }
   }
-  good &= nis <= gate;
+  auto sound = good;
+  for (int m = 1; m < N; ++m) {
+    const int place = Batch::place(m, m);
+    sound &= lower[m][m] >= (belief.covariance[place] + seen.covariance[place]) * least;
+  }
+  const auto taken = nis <= gate;
   typename Batch::Block next = belief;
   for (int m = 0; m < N; ++m)
     for (int i = 0; i < N; ++i) {
@@ -158,13 +179,30 @@ template <int N, class S>
       next.mean[i] += scaled * y[m];
       for (int j = 0; j <= i; ++j) next.covariance[Batch::place(i, j)] -= scaled * w[m][j];
     }
+  auto kept = sound;
   for (int i = 0; i < N; ++i) {
-    good &= next.covariance[Batch::place(i, i)] > S(0);
+    kept &= next.covariance[Batch::place(i, i)] > belief.covariance[Batch::place(i, i)] * least;
     good &= next.mean[i] - next.mean[i] == S(0);
   }
+  const auto doubtful = ~sound | (taken & ~kept);
+  good &= kept & taken;
   for (int i = 0; i < N; ++i) belief.mean[i] = good ? next.mean[i] : belief.mean[i];
   for (int i = 0; i < Batch::triangle; ++i)
     belief.covariance[i] = good ? next.covariance[i] : belief.covariance[i];
+  return BlockVerdict<decltype(good)>{good, doubtful};
+}
+
+/// The filter of one lane alone.
+template <int N, class S>
+[[nodiscard, gnu::cold, gnu::noinline]] bool update_lane(GaussianBatch<N, S>& batch,
+                                                         const GaussianBatch<N, S>& seen, std::size_t index,
+                                                         double gate) {
+  auto belief = batch.get(index);
+  const auto z = seen.get(index);
+  const bool good = correct<Vector<N, S>, N>(belief, Identity<N, S>{}, z.covariance,
+                                             Vector<N, S>(z.mean - belief.mean), gate, Form::standard)
+                        .accepted();
+  if (good) batch.set(index, belief);
   return good;
 }
 
@@ -181,22 +219,27 @@ std::size_t BatchKalman::update(GaussianBatch<N, S>& batch, const GaussianBatch<
   constexpr std::size_t lanes = GaussianBatch<N, S>::lanes;
   std::size_t count = 0;
   for (std::size_t b = 0; b < batch.blocks().size(); ++b) {
-    const auto good = detail::update_block<N, S>(batch.blocks()[b], seen.blocks()[b], limit);
+    const auto verdict = detail::update_block<N, S>(batch.blocks()[b], seen.blocks()[b], limit);
     const std::size_t first = b * lanes;
     const std::size_t used = batch.size() - first < lanes ? batch.size() - first : lanes;
     for (std::size_t lane = 0; lane < used; ++lane) {
-      count += good[lane] != 0 ? 1 : 0;
-      if (!kept.empty()) kept[first + lane] = good[lane] != 0 ? 1 : 0;
+      bool good = verdict.good[lane] != 0;
+      if (verdict.doubtful[lane] != 0) [[unlikely]]
+        good = detail::update_lane(batch, seen, first + lane, gate);
+      count += good ? 1 : 0;
+      if (!kept.empty()) kept[first + lane] = good ? 1 : 0;
     }
   }
   return count;
 }
 
 template <int N, class S, class F>
-void BatchKalman::predict(GaussianBatch<N, S>& batch, const F& f, const Matrix<N, N, S>& q) const {
+Status BatchKalman::predict(GaussianBatch<N, S>& batch, const F& f, const Matrix<N, N, S>& q) const {
   using Batch = GaussianBatch<N, S>;
   using Lane = typename Batch::Lane;
   const Matrix<N, N, S> a = detail::dense_of(f);
+  if (!all_finite(a)) return Status::not_finite;
+  if (const Status status = detail::judge_noise<N, S>(q); status != Status::accepted) return status;
   for (auto& block : batch.blocks()) {
     Lane u[N][N];  // F P
     Lane x[N];
@@ -218,6 +261,7 @@ void BatchKalman::predict(GaussianBatch<N, S>& batch, const F& f, const Matrix<N
       }
     }
   }
+  return Status::accepted;
 }
 
 }  // namespace cairn::inline CAIRN_ABI

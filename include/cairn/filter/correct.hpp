@@ -9,16 +9,20 @@
 ///   joseph      (I - K H) P (I - K H)^T + K R K^T       a sum of squares; keeps more digits when R is tiny
 ///   sequential  one number of the measurement after the other (R is decorrelated first)
 /// (Bar-Shalom, Li, Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001, 5.2.3 and
-/// 7.3; Grewal, Andrews, "Kalman Filtering", chapter 6.) Where cancellation is worse than these can bear use
-/// square_root.hpp or ud.hpp; here it ends in Status::not_positive_definite, not in a wrong covariance. A
-/// measurement without noise (R = 0) leaves no digits of P - W W^T: take joseph.
+/// 7.3; Grewal, Andrews, "Kalman Filtering", chapter 6.) Where S is so nearly singular or P lowered so far
+/// that rounding would leave fewer than three digits (a sensor that is a million times better than the prior,
+/// two that see the same, R = 0), the update is done again by the array of array_update.hpp: several times
+/// slower, and right to the square of that. A belief that keeps P itself cannot remember more than the
+/// rounding of P, though: where that matters from step to step use square_root.hpp or ud.hpp.
 #pragma once
 
 #include <algorithm>
 #include <limits>
 
 #include <cairn/core/cholesky.hpp>
+#include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/array_update.hpp>
 #include <cairn/filter/correction.hpp>
 #include <cairn/filter/elimination.hpp>
 #include <cairn/filter/gaussian.hpp>
@@ -45,6 +49,10 @@ struct Candidate {
   void covariance_to(Matrix<N, N, S>& to) const {
     each<N>([&](int j) { covariance[j].store(to.data() + j * N); });
   }
+  void take(const Vector<N, S>& new_step, const Matrix<N, N, S>& new_covariance) {
+    step.load(new_step.data());
+    load_columns(new_covariance, covariance);
+  }
 };
 template <int N, int M, class S>
   requires(N == dynamic || M == dynamic)
@@ -55,6 +63,10 @@ struct Candidate<N, M, S> {
 
   void step_to(Vector<N, S>& to) const { to = step; }
   void covariance_to(Matrix<N, N, S>& to) const { to = covariance; }
+  void take(const Vector<N, S>& new_step, const Matrix<N, N, S>& new_covariance) {
+    step = new_step;
+    covariance = new_covariance;
+  }
 };
 
 template <int M, class S>
@@ -65,15 +77,45 @@ template <int M, class S>
   return result;
 }
 
-/// Why an update that went wrong went wrong. Off the hot path.
-template <int M, class S, class P>
-[[nodiscard, gnu::cold, gnu::noinline]] Status diagnose(const Innovation<M, S>& in, const P& prior,
-                                                        double gate) {
-  if (!(gate > 0.0)) return Status::bad_option;
-  if (!all_finite(in.residual) || !all_finite(in.covariance) || !all_finite(prior)) return Status::not_finite;
-  if (!Cholesky<M, S>(in.covariance).good()) return Status::not_positive_definite;
-  if (in.nis > static_cast<S>(gate)) return Status::gated;
-  return finite(in.nis) ? Status::not_positive_definite : Status::not_finite;
+/// An update that was not simply sound: says why it is refused, or does it again by again(), which fills an
+/// array for update_by_array() and returns its result or the status that forbids it. `sound` where S kept its
+/// digits, so that its NIS is right. Off the hot path.
+template <int N, int M, class S, class Prior, class Again>
+[[gnu::cold, gnu::noinline]] void reconsider(Candidate<N, M, S>& out, const Prior& prior, double gate,
+                                             bool sound, const Again& again) {
+  Innovation<M, S>& in = out.innovation;
+  if (!(gate > 0.0)) {
+    in.status = Status::bad_option;
+  } else if (!all_finite(in.residual) || !all_finite(in.covariance) || !all_finite(prior)) {
+    in.status = Status::not_finite;
+  } else if (sound && in.nis > static_cast<S>(gate)) {
+    in.status = Status::gated;
+  } else {
+    ArrayUpdate<N, M, S> update;
+    in.status = again(update);
+    if (in.status == Status::accepted) in.status = judge_array(update, in, gate);
+    if (in.status == Status::accepted) out.take(update.step, squared_root<N, S>(update.root));
+  }
+}
+
+/// The update by an array from P, H and R themselves.
+template <int N, int M, class S>
+[[nodiscard]] Status update_by_roots(const Matrix<N, N, S>& prior, const Matrix<M, N, S>& h,
+                                     const Matrix<M, M, S>& r, const Vector<M, S>& residual,
+                                     ArrayUpdate<N, M, S>& update) {
+  const int n = static_cast<int>(prior.rows()), m = static_cast<int>(residual.size());
+  Matrix<N, N, S> root = prior;
+  Matrix<M, M, S> root_r = r;
+  if (!checked_root<N, S>(prior, root) || !checked_root<M, S>(r, root_r))
+    return Status::not_positive_definite;
+  constexpr int size = size_sum<N, M>;
+  Matrix<size, size, S> array = Matrix<size, size, S>::Zero(m + n, m + n);
+  put_transposed(array, 0, 0, root_r);
+  put_transposed(array, m, 0, column_product(h, root));
+  put_transposed(array, m, m, root);
+  update = update_by_array<N, M, S>(array, residual, n);
+  const bool good = update.regular && determined<N, M, S>(update, root, h, r, KeptAs::covariance);
+  return good ? Status::accepted : Status::not_positive_definite;
 }
 
 template <int N, int M, class S, class H>
@@ -97,7 +139,27 @@ template <int N, int M, class S, class H>
   return congruence(a, p, congruence(k, r, zero));
 }
 
-/// One number at a time: z_j = h_j x + noise of variance d_j, after L^-1 with R = L diag(d) L^T.
+/// The updated P has three digits left: no variance has shrunk to the rounding error of the one it was taken
+/// from. `digits` is the least part that may be left.
+template <int N, class S>
+[[nodiscard]] inline bool keeps_digits(const Matrix<N, N, S>& updated, const Matrix<N, N, S>& prior,
+                                       const S& digits) {
+  bool good = true;
+  for (int i = 0; i < static_cast<int>(prior.rows()); ++i)
+    good = good && updated(i, i) >= digits * prior(i, i);
+  return good;
+}
+template <int N, class S>
+[[gnu::always_inline]] [[nodiscard]] inline bool keeps_digits(const Column<N, S> (&updated)[N],
+                                                              const Matrix<N, N, S>& prior,
+                                                              const S& digits) {
+  bool good = true;
+  each<N>([&](int i) { good = good && updated[i][i] >= digits * prior(i, i); });
+  return good;
+}
+
+/// One number at a time: z_j = h_j x + noise of variance d_j, after L^-1 with R = L diag(d) L^T. False where a
+/// variance is left too few digits.
 template <int N, int M, class S, class H>
 [[nodiscard, gnu::noinline]] bool sequential(const H& h, const Matrix<M, M, S>& r,
                                              const Vector<M, S>& residual, const Matrix<N, N, S>& prior,
@@ -105,7 +167,8 @@ template <int N, int M, class S, class H>
   using std::sqrt;
   S lower[M][M];
   S inverse_root[M];
-  if (!factor(r, lower, inverse_root)) return false;
+  S loss;
+  if (!factor(r, lower, inverse_root, loss) || !(digits_left<S> * loss < S(1))) return false;
   Matrix<M, N, S> rows = dense_of(h);
   Vector<M, S> left = residual;
   load_columns(prior, lowered);
@@ -120,36 +183,21 @@ template <int N, int M, class S, class H>
     w[0].set_zero();
     for (int i = 0; i < N; ++i) w[0].add(lowered[i], rows(j, i));
     S variance = S(1) / (inverse_root[j] * inverse_root[j]);
+    S before = variance;  // its size had the numbers before it not been taken
     S error = left(j);
     for (int i = 0; i < N; ++i) {
       variance += rows(j, i) * w[0][i];
+      before += rows(j, i) * rows(j, i) * prior(i, i);
       error -= rows(j, i) * moved[i];
     }
-    if (!(variance > S(0))) return false;
+    if (!(variance > digits_left<S> * before)) return false;
+    loss = std::max(loss, before / variance);
     moved.add(w[0], error / variance);
     nis += error * error / variance;
     w[0].scale(S(1) / sqrt(variance));
     lower_by_squares(lowered, w);
   }
-  return true;
-}
-
-/// P - W W^T has digits left: no variance has shrunk to the rounding error of the one it was taken from.
-template <int N, class S>
-[[nodiscard]] inline bool keeps_digits(const Matrix<N, N, S>& updated, const Matrix<N, N, S>& prior) {
-  constexpr S least = S(4) * std::numeric_limits<S>::epsilon();
-  bool good = true;
-  for (int i = 0; i < static_cast<int>(prior.rows()); ++i)
-    good = good && updated(i, i) >= least * prior(i, i);
-  return good;
-}
-template <int N, class S>
-[[gnu::always_inline]] [[nodiscard]] inline bool keeps_digits(const Column<N, S> (&updated)[N],
-                                                              const Matrix<N, N, S>& prior) {
-  constexpr S least = S(4) * std::numeric_limits<S>::epsilon();
-  bool good = true;
-  each<N>([&](int i) { good = good && updated[i][i] >= least * prior(i, i); });
-  return good;
+  return keeps_digits<N, S>(lowered, prior, digits_left<S> * loss);
 }
 
 /// The update for sizes known at compile time.
@@ -162,18 +210,23 @@ template <int N, int M, class S, class H>
   Column<N, S>(&p)[N] = out.covariance;
   load_columns(prior, p);
   Correction<N, M, S> c;
-  bool good = correction(p, h, r, in.covariance, c);
+  const bool regular = correction(p, h, r, in.covariance, c);
+  const S digits = digits_left<S> * c.loss;
+  const bool sound = regular && (M == 1 || digits < S(1));
   in.nis = c.take(in.residual.data(), out.step);
-  good = good && gate > 0.0 && in.nis <= static_cast<S>(gate) && in.nis <= std::numeric_limits<S>::max();
+  bool good =
+      sound && gate > 0.0 && in.nis <= static_cast<S>(gate) && in.nis <= std::numeric_limits<S>::max();
   if (form == Form::standard) [[likely]]
     lower_by_squares(p, c.w);
   else if (good && form == Form::joseph)
     load_columns(joseph<N, M, S>(prior, h, r, c), p);
   else if (good)
     good = sequential<N, M, S>(h, r, in.residual, prior, p, out.step, in.nis);
-  good = good && (form == Form::joseph || keeps_digits<N, S>(p, prior)) && is_covariance(p);
+  good = good && keeps_digits<N, S>(p, prior, digits) && is_covariance(p);
   if (!good) [[unlikely]]
-    in.status = diagnose<M, S>(in, prior, gate);
+    reconsider(out, prior, gate, sound, [&](ArrayUpdate<N, M, S>& update) {
+      return update_by_roots<N, M, S>(prior, dense_of(h), r, in.residual, update);
+    });
 }
 
 /// The update for sizes known at run time; sequential is standard there.
@@ -193,8 +246,9 @@ void correct_into(Candidate<N, M, S>& out, const Matrix<N, N, S>& prior, const M
   const Matrix<M, N, S> w = root.whiten(Matrix<M, N, S>(ph.transpose()));  // S^-1/2 H P
   const Vector<M, S> y = root.whiten(in.residual);
   in.nis = y.squaredNorm();
-  bool good =
-      root.good() && in.nis <= static_cast<S>(gate) && gate > 0.0 && in.nis <= std::numeric_limits<S>::max();
+  const S digits = digits_left<S> / root.least_share();
+  const bool sound = root.good() && digits < S(1);
+  bool good = sound && in.nis <= static_cast<S>(gate) && gate > 0.0 && in.nis <= std::numeric_limits<S>::max();
   if (good) {
     out.step = w.transpose() * y;
     if (form == Form::joseph) {
@@ -205,10 +259,12 @@ void correct_into(Candidate<N, M, S>& out, const Matrix<N, N, S>& prior, const M
     } else {
       out.covariance = symmetrised(prior - w.transpose() * w);
     }
-    good = (form == Form::joseph || keeps_digits<N, S>(out.covariance, prior)) &&
-           is_valid_covariance<N, S>(out.covariance);
+    good = keeps_digits<N, S>(out.covariance, prior, digits) && is_valid_covariance<N, S>(out.covariance);
   }
-  if (!good) in.status = diagnose<M, S>(in, prior, gate);
+  if (!good)
+    reconsider(out, prior, gate, sound, [&](ArrayUpdate<N, M, S>& update) {
+      return update_by_roots<N, M, S>(prior, h, r, in.residual, update);
+    });
 }
 
 /// Runs the update and keeps it in the belief if everything about it is sound.
@@ -235,14 +291,45 @@ template <Manifold X, int M, class H>
   return candidate.innovation;
 }
 
+/// What is the matter with a noise that does not look like a covariance at first sight, if anything.
+template <int N, class S>
+[[nodiscard, gnu::cold, gnu::noinline]] Status judge_noise(const Matrix<N, N, S>& q) {
+  if (!all_finite(q)) return Status::not_finite;
+  return is_valid_covariance<N, S>(q) ? Status::accepted : Status::not_positive_definite;
+}
+
+/// At first sight: the noise is a covariance. False says only that judge_noise() must look. Zeros that are
+/// known when compiling cost nothing, and a matrix that is diagonal as it happens next to nothing; any other
+/// is eliminated, O(N^3 / 6).
+template <int N, class Q>
+[[gnu::always_inline]] [[nodiscard]] inline bool looks_like_noise(const Q& q) {
+  bool good = true;
+  if constexpr (is_diagonal<Q>) {
+    each<N>([&](int i) { good = good && q.values[static_cast<std::size_t>(i)] >= 0; });
+  } else if constexpr (is_structured<Q> && N <= 10) {
+    good = eliminates(q);
+  } else if constexpr (is_structured<Q>) {
+    good = is_covariance(Matrix<N, N, typename Q::Scalar>(q.dense()));
+  } else {
+    bool diagonal = true;
+    each<N>([&](int j) __attribute__((always_inline)) {
+      good = good && q(j, j) >= 0;
+      each<N>(j + 1, N, [&](int i) { diagonal = diagonal && q(i, j) == 0; });
+    });
+    if (!diagonal) good = is_covariance(q);
+  }
+  return good;
+}
+
 /// Q with the stabilising noise, if the options are in range and it is a covariance.
 template <Manifold X>
 [[nodiscard]] Status stabilise(CovarianceOf<X>& q, double fading, double stabilising_noise) {
   using S = ScalarOf<X>;
   if (!(fading >= 1.0) || !(stabilising_noise >= 0.0)) return Status::bad_option;
+  const Status status = judge_noise<dof<X>, S>(q);
+  if (status != Status::accepted) return status;
   for (int i = 0; i < static_cast<int>(q.rows()); ++i) q(i, i) += static_cast<S>(stabilising_noise);
-  if (!all_finite(q)) return Status::not_finite;
-  return is_valid_covariance<dof<X>, S>(q) ? Status::accepted : Status::not_positive_definite;
+  return all_finite(q) ? Status::accepted : Status::not_finite;
 }
 
 /// Finite, with no variance below zero. One pass: a NaN or infinity anywhere makes the sum NaN.
@@ -290,6 +377,8 @@ template <Manifold X, class F, class Q>
     add_to_diagonal(next, static_cast<S>(extra));
   if (!finite_variances(next) || !finite_state(mean)) [[unlikely]]
     return diagnose_prediction(next, mean);
+  if (!looks_like_noise<n>(q)) [[unlikely]]
+    if (const Status status = judge_noise<n, S>(dense_of(q)); status != Status::accepted) return status;
   belief.mean = mean;
   each<n>([&](int j) { next[j].store(belief.covariance.data() + j * n); });
   return Status::accepted;
@@ -304,6 +393,7 @@ Status advance(Gaussian<X>& belief, const X& mean, const F& f, const CovarianceO
   if (f.rows() != belief.covariance.rows() || f.cols() != f.rows() || q.rows() != f.rows() ||
       q.cols() != f.rows())
     return Status::size_mismatch;
+  if (const Status status = judge_noise<dof<X>, S>(q); status != Status::accepted) return status;
   CovarianceOf<X> next = static_cast<S>(fading) * f * belief.covariance * f.transpose();
   next = symmetrised(next + q);
   bool positive = true;

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 
+#include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/column.hpp>
 #include <cairn/filter/kernels.hpp>
@@ -16,20 +17,26 @@
 
 namespace cairn::inline CAIRN_ABI::detail {
 
-/// L D L^T of `a` into unit lower L and D^-1/2. False where a pivot is not positive. Divisions stay on the
-/// critical path, roots do not.
+/// L D L^T of `a` into unit lower L and D^-1/2. False where a pivot is not positive. `loss` is by how much the
+/// smallest share of a diagonal element that is left for its pivot multiplies rounding: 1 or above. Divisions
+/// stay on the critical path, roots do not.
 template <int M, class S>
 [[gnu::always_inline]] [[nodiscard]] inline bool factor(const Matrix<M, M, S>& a, S (&lower)[M][M],
-                                                        S (&inverse_root)[M]) {
+                                                        S (&inverse_root)[M], S& loss) {
   using std::sqrt;
   bool good = true;
   S raw[M][M];
   each<M>([&](int i)
               __attribute__((always_inline)) { each<M>(0, i + 1, [&](int j) { raw[i][j] = a(i, j); }); });
+  loss = S(1);
   each<M>([&](int j) __attribute__((always_inline)) {
     good = good && raw[j][j] > S(0) && raw[j][j] <= std::numeric_limits<S>::max();
     const S inverse = S(1) / raw[j][j];
     inverse_root[j] = sqrt(inverse);
+    if (j > 0) {  // the first pivot is its diagonal element
+      const S share = inverse * a(j, j);
+      loss = share > loss ? share : loss;
+    }
     each<M>(j + 1, M, [&](int i) { lower[i][j] = raw[i][j] * inverse; });
     each<M>(j + 1, M, [&](int i) __attribute__((always_inline)) {
       each<M>(j + 1, i + 1, [&](int k) { raw[i][k] -= lower[i][j] * raw[k][j]; });
@@ -45,11 +52,12 @@ struct Correction {
   Column<N, S> w[M];
   S lower[M][M];
   S inverse_root[M];
+  S loss;  ///< see factor()
 
-  /// From S and the columns of P H^T (the cross-covariance). False where S is not positive definite.
+  /// From S and the columns of P H^T (the cross-covariance). False where factor() is.
   [[gnu::always_inline]] [[nodiscard]] bool fill(const Matrix<M, M, S>& covariance,
                                                  Column<N, S> (&cross)[M]) {
-    const bool good = factor(covariance, lower, inverse_root);
+    const bool good = factor(covariance, lower, inverse_root, loss);
     each<M>([&](int j) __attribute__((always_inline)) {
       each<M>(0, j, [&](int k) { cross[j].subtract(cross[k], lower[j][k]); });
       w[j] = cross[j];
@@ -82,7 +90,7 @@ struct Correction {
   }
 };
 
-/// Fills `covariance` = H P H^T + R and the correction. False where it is not positive definite.
+/// Fills `covariance` = H P H^T + R and the correction. False where factor() of it is.
 template <class H, int N, int M, class S>
 [[gnu::always_inline]] [[nodiscard]] inline bool correction(const Column<N, S> (&p)[N], const H& h,
                                                             const Matrix<M, M, S>& r,

@@ -7,8 +7,8 @@
 #pragma once
 
 #include <cmath>
-#include <limits>
 
+#include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/column.hpp>
 #include <cairn/filter/column_shapes.hpp>
@@ -18,44 +18,14 @@
 namespace cairn::inline CAIRN_ABI::detail {
 
 /// Eliminates the columns of a symmetric matrix one after the other (L D L^T without roots) and hands each to
-/// keep(j, column, pivot) before it is used; column j is L d_j from row j on. False where the matrix is not
-/// finite or not positive semi-definite up to the rounding of its own diagonal. O(N^3 / 6).
-template <int N, class S, class Keep>
-[[gnu::always_inline]] [[nodiscard]] inline bool eliminate(Column<N, S> (&columns)[N], const Keep& keep) {
-  constexpr S slack = S(64) * std::numeric_limits<S>::epsilon();
-  S diagonal[N];
-  each<N>([&](int j) { diagonal[j] = columns[j][j]; });
-  bool good = true;
-  each<N>([&](int j) __attribute__((always_inline)) {
-    const S pivot = columns[j][j];
-    const S floor = slack * diagonal[j];
-    if (!(pivot > floor)) [[unlikely]] {  // NaN, negative, or a direction without uncertainty
-      good =
-          good && pivot >= -floor && diagonal[j] >= S(0) && diagonal[j] < std::numeric_limits<S>::infinity();
-      for (int k = j + 1; k < N; ++k)
-        good = good && columns[j][k] * columns[j][k] <= S(4) * slack * diagonal[j] * diagonal[k];
-      keep(j, columns[j], S(0));
-    } else {
-      keep(j, columns[j], pivot);
-      const S inverse = S(1) / pivot;
-      each<N>(j + 1, N, [&](int k) { columns[k].subtract(columns[j], columns[j][k] * inverse); });
-    }
-  });
-  return good;
-}
-template <int N, class S, class Keep>
-[[gnu::always_inline]] [[nodiscard]] inline bool eliminate(const Matrix<N, N, S>& a, const Keep& keep) {
-  Column<N, S> columns[N];
-  load_columns(a, columns);
-  return eliminate(columns, keep);
-}
-
-/// The same where every pivot is well above zero, with one branch at the end; false says nothing about the
-/// matrix but that eliminate() must look at it. Only rows on and below the diagonal are kept up.
+/// keep(j, column, pivot) before it is used; column j is L d_j from row j on. For a matrix whose every pivot is
+/// well above the rounding of its own diagonal, with one branch at the end; false says nothing about the
+/// matrix but that core/factor.hpp must look at it. Only rows on and below the diagonal are kept up.
+/// O(N^3 / 6).
 template <int N, class S, class Keep>
 [[gnu::always_inline]] [[nodiscard]] inline bool eliminate_regular(Column<N, S> (&columns)[N],
                                                                    const Keep& keep) {
-  constexpr S slack = S(64) * std::numeric_limits<S>::epsilon();
+  constexpr S slack = rounding_share<S>;
   constexpr int width = Column<N, S>::width;
   S diagonal[N];
   each<N>([&](int j) { diagonal[j] = columns[j][j]; });
@@ -74,34 +44,40 @@ template <int N, class S, class Keep>
   return regular;
 }
 
-/// Symmetric `a` is finite and positive semi-definite.
+/// Symmetric `a` is finite and positive semi-definite up to the rounding of its own diagonal.
+template <int N, class S>
+[[gnu::always_inline]] [[nodiscard]] inline bool is_regular(Column<N, S> (&work)[N]) {
+  return eliminate_regular(work, [](int, const Column<N, S>&, const S&) {});
+}
 template <int N, class S>
 [[nodiscard]] inline bool is_covariance(const Matrix<N, N, S>& a) {
-  return eliminate(a, [](int, const Column<N, S>&, const S&) {});
+  Column<N, S> work[N];
+  load_columns(a, work);
+  if (is_regular(work)) return true;
+  PivotedRoot<N, S> root;
+  return pivoted_root<N, S>(a, root);
 }
 template <int N, class S>
 [[nodiscard, gnu::cold, gnu::noinline]] bool is_semi_definite(const Column<N, S> (&p)[N]) {
-  Column<N, S> work[N];
-  for (int j = 0; j < N; ++j) work[j] = p[j];
-  return eliminate(work, [](int, const Column<N, S>&, const S&) {});
+  Matrix<N, N, S> a;
+  PivotedRoot<N, S> root;
+  for (int j = 0; j < N; ++j) p[j].store(a.data() + j * N);
+  return pivoted_root<N, S>(a, root);
 }
 template <int N, class S>
 [[gnu::always_inline]] [[nodiscard]] inline bool is_covariance(const Column<N, S> (&p)[N]) {
   Column<N, S> work[N];
   each<N>([&](int j) { work[j] = p[j]; });
-  return eliminate_regular(work, [](int, const Column<N, S>&, const S&) {}) || is_semi_definite(p);
+  return is_regular(work) || is_semi_definite(p);
 }
 
-/// Lower triangular root with root root^T = a; a direction without variance gives a column of zeros. False,
-/// and no use, where `a` is no covariance.
+/// Lower triangular root with root root^T = a for any covariance; false, and no use, where `a` is none.
 template <int N, class S>
 [[nodiscard, gnu::cold, gnu::noinline]] bool careful_root(const Matrix<N, N, S>& a, Column<N, S> (&root)[N]) {
-  using std::sqrt;
-  return eliminate(a, [&](int j, const Column<N, S>& column, const S& pivot) {
-    root[j] = column;
-    root[j].scale(pivot > S(0) ? S(1) / sqrt(pivot) : S(0));
-    clear_before(root[j], j);
-  });
+  Matrix<N, N, S> lower;
+  if (!singular_root<N, S>(a, lower)) return false;
+  load_columns(lower, root);
+  return true;
 }
 template <int N, class S>
 [[gnu::always_inline]] [[nodiscard]] inline bool covariance_root(const Matrix<N, N, S>& a,

@@ -164,8 +164,7 @@ private:
   template <int M, class S>
   Status judge(const Innovation<M, S>& in, const Matrix<M, M, S>& r, Matrix<M, M, S>& root) const {
     if (!all_finite(in.residual) || !all_finite(in.covariance) || !all_finite(r)) return Status::not_finite;
-    if (!detail::checked_root<M, S>(r, root) || !(root.diagonal().array() > S(0)).all())
-      return Status::not_positive_definite;
+    if (!detail::regular_root<M, S>(r, root)) return Status::not_positive_definite;
     return in.nis <= static_cast<S>(gate) ? Status::accepted : Status::gated;
   }
 

@@ -8,13 +8,20 @@
 ///   update    x <- x (+) K (z (-) h(x)),   P <- P - K S K^T,   H the Jacobian at x
 /// With iterations > 1 the update relinearises: e_{k+1} = K_k (z (-) h(x_k) + H_k e_k), x_k = x (+) e_k,
 /// which is Gauss-Newton on the posterior density (B. Bell, F. Cathey, "The iterated Kalman filter update as
-/// a Gauss-Newton method", IEEE Trans. Automatic Control 38, 1993); a step that does not lower the cost is
-/// halved. The error lives in the tangent space at the mean (an error-state filter).
+/// a Gauss-Newton method", IEEE Trans. Automatic Control 38, 1993); a step that does not lower the cost
+///   |u|^2 + r^T R^-1 r,   e = L u,   P = L L^T,   r = z (-) h(x (+) L u),   R as at the last x_k
+/// is halved. P may be singular: what it is certain of does not move. Each step is solved by the array of
+/// array_update.hpp. The error lives in the tangent space at the mean (an error-state filter).
 #pragma once
 
+#include <cmath>
 #include <concepts>
 #include <limits>
+#include <utility>
 
+#include <cairn/core/factor.hpp>
+#include <cairn/core/linalg.hpp>
+#include <cairn/filter/array_update.hpp>
 #include <cairn/filter/correct.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
@@ -30,8 +37,9 @@ struct Extended {
   double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
   double fading = 1.0;             ///< fading memory: F P F^T is multiplied by this each step; >= 1
   double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
-  int iterations = 1;              ///< of the update; 1 is the plain filter
-  double tolerance = 1e-10;        ///< iterations end when the step changes by less, in standard deviations
+  int iterations = 1;              ///< of the update, at most; 1 is the plain filter
+  double tolerance = 1e-10;        ///< iterations end when the step changes by less, in the new deviations
+  double settled = 1e-3;           ///< refused as not_converged where they end with a larger change
 
   /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite.
   template <LinearisedProcess F>
@@ -50,7 +58,8 @@ struct Extended {
   }
 
   /// Takes in the measurement z, or refuses it and leaves the belief as it was. The innovation is the one
-  /// before the update, whatever the iterations.
+  /// before the update, whatever the iterations. Where R is singular there is no cost to compare, and
+  /// iterations take full steps.
   template <LinearisedMeasurement H>
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
       Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
@@ -64,7 +73,7 @@ struct Extended {
     auto innovation =
         detail::correct<X, m>(first, sensor.jacobian(belief.mean),
                               detail::dense_of(sensor.noise(belief.mean)), residual, gate, form);
-    if (iterations < 1) innovation.status = Status::bad_option;
+    if (iterations < 1 || !(tolerance >= 0.0) || !(settled >= 0.0)) innovation.status = Status::bad_option;
     if (innovation.accepted()) innovation.status = iterate(belief, sensor, z);
     return innovation;
   }
@@ -76,18 +85,6 @@ private:
 };
 
 namespace detail {
-
-/// Twice the negative logarithm of the posterior at prior (+) e, without constants.
-template <class H, Manifold X>
-[[nodiscard]] ScalarOf<X> posterior_cost(const Gaussian<X>& prior, const Tangent<X>& e, const H& sensor,
-                                         const typename H::Measurement& z) {
-  using S = ScalarOf<X>;
-  constexpr int m = dof<typename H::Measurement>;
-  const X x = retract(prior.mean, e);
-  const Vector<m, S> residual = local(typename H::Measurement(sensor.predict(x)), z);
-  const Matrix<m, m, S> r = sensor.noise(x);
-  return squared_mahalanobis<dof<X>, S>(e, prior.covariance) + squared_mahalanobis<m, S>(residual, r);
-}
 
 /// Derivative at d = e of the step seen from x = prior (+) e: how tangent vectors move from the prior's mean
 /// to x. Nothing to move between vectors: their tangent space is one.
@@ -102,45 +99,96 @@ template <class H>
 Status Extended::iterate(Gaussian<typename H::State>& belief, const H& sensor,
                          const typename H::Measurement& z) const {
   using X = typename H::State;
+  using Z = typename H::Measurement;
   using S = ScalarOf<X>;
+  using std::abs;
+  using std::sqrt;
   constexpr int n = dof<X>;
-  constexpr int m = dof<typename H::Measurement>;
-  constexpr double no_gate = std::numeric_limits<double>::infinity();
-  Tangent<X> e = local(belief.mean, belief.mean);
-  S cost = detail::posterior_cost(belief, e, sensor, z);
-  CovarianceOf<X> covariance = belief.covariance;
-  for (int k = 0; k < iterations; ++k) {
+  constexpr int m = dof<Z>;
+  CovarianceOf<X> root = belief.covariance;
+  if (!detail::checked_root<n, S>(belief.covariance, root)) return Status::not_positive_definite;
+  const int ns = static_cast<int>(root.rows());
+  Tangent<X> u = Tangent<X>::Zero(ns), e = u;
+  Vector<m, S> residual = local(Z(sensor.predict(belief.mean)), z);
+  const int ms = static_cast<int>(residual.size());
+  CovarianceOf<X> updated = root;  // a root of the covariance in the tangent space of the prior
+  bool done = false;
+  S size(0);  // of the last change
+  for (int k = 0; k < iterations && !done; ++k) {
     const X x = retract(belief.mean, e);
     Matrix<m, n, S> h = detail::dense_of(sensor.jacobian(x));
     if constexpr (!detail::is_vector<X>) h = (h * detail::transport(belief.mean, e)).eval();
-    Vector<m, S> residual = local(typename H::Measurement(sensor.predict(x)), z);
-    residual += h * e;
     const Matrix<m, m, S> noise = sensor.noise(x);
-    detail::Candidate<n, m, S> next{detail::fresh_innovation<m, S>(residual, noise), {}, {}};
-    detail::correct_into<n, m, S>(next, belief.covariance, h, noise, no_gate, form);
-    if (next.innovation.status != Status::accepted) return next.innovation.status;
-    next.covariance_to(covariance);
-    Tangent<X> change = e;
-    next.step_to(change);
-    change -= e;
-    S lower = detail::posterior_cost(belief, Tangent<X>(e + change), sensor, z);
-    for (int halving = 0; halving < 10 && !(lower <= cost); ++halving) {
-      change *= S(0.5);
-      lower = detail::posterior_cost(belief, Tangent<X>(e + change), sensor, z);
+    if (!all_finite(h) || !all_finite(noise) || !all_finite(residual)) return Status::not_finite;
+    Matrix<m, m, S> root_r = noise, white_r = noise;
+    if (!detail::checked_root<m, S>(noise, root_r)) return Status::not_positive_definite;
+    const bool has_cost = detail::regular_root<m, S>(noise, white_r);
+    const Matrix<m, n, S> g = detail::column_product(h, root);
+    Matrix<detail::size_sum<m, n>, detail::size_sum<m, n>, S> array(ms + ns, ms + ns);
+    array.setZero();
+    detail::put_transposed(array, 0, 0, root_r);
+    detail::put_transposed(array, ms, 0, g);
+    for (int i = 0; i < ns; ++i) array(ms + i, ms + i) = S(1);
+    auto update =
+        detail::update_by_array<n, m, S>(array, Vector<m, S>(residual + detail::column_product(g, u)), ns);
+    if (!update.regular || !all_finite(update.step)) return Status::not_positive_definite;
+    updated = detail::column_product(root, update.root);
+    update.white = detail::column_product(root, update.white);
+    std::swap(update.root, updated);
+    if (!detail::determined<n, m, S>(update, root, h, noise, detail::KeptAs::covariance))
+      return Status::not_positive_definite;
+    std::swap(update.root, updated);
+    Tangent<X> change = update.step - u;
+    const Tangent<X> moved = detail::column_product(root, change);
+    size = S(0);
+    for (int i = 0; i < ns; ++i) {
+      S after(0), before(0);
+      for (int j = 0; j < ns; ++j) {
+        after += updated(i, j) * updated(i, j);
+        before += root(i, j) * root(i, j);
+      }
+      const S rounding = S(64) * std::numeric_limits<S>::epsilon() * (sqrt(before) + abs(e(i)));
+      const S beyond = abs(moved(i)) - rounding;
+      if (beyond > S(0) && !(beyond <= size * sqrt(after))) size = beyond / sqrt(after);
     }
-    if (!(lower <= cost)) break;  // no descent left above rounding
-    e += change;
-    cost = lower;
-    const S size = detail::squared_mahalanobis<n, S>(change, belief.covariance);
-    if (size <= static_cast<S>(tolerance * tolerance)) break;
+    done = size <= static_cast<S>(tolerance);
+    const auto cost = [&](const Tangent<X>& at, const Vector<m, S>& r) {
+      S sum(0);
+      for (int i = 0; i < ns; ++i) sum += at(i) * at(i);
+      Vector<m, S> y = r;
+      for (int i = 0; i < ms; ++i) {
+        for (int j = 0; j < i; ++j) y(i) -= white_r(i, j) * y(j);
+        y(i) /= white_r(i, i);
+        sum += y(i) * y(i);
+      }
+      return sum;
+    };
+    const S now = has_cost ? cost(u, residual) : S(0);
+    const S enough = now + S(16) * std::numeric_limits<S>::epsilon() * now;
+    bool lower = false;
+    for (int halving = 0; halving < 40 && !lower; ++halving) {
+      const Tangent<X> next = u + change;
+      const Tangent<X> next_e = detail::column_product(root, next);
+      const Vector<m, S> next_residual =
+          local(Z(sensor.predict(retract(belief.mean, next_e))), z);
+      lower = done || (has_cost ? cost(next, next_residual) <= enough : all_finite(next_residual));
+      if (lower) {
+        u = next;
+        e = next_e;
+        residual = next_residual;
+      }
+      change *= S(0.5);
+    }
+    if (!lower) break;  // no descent left above rounding
   }
-  if (!all_finite(e) || !detail::finite_state(belief.mean)) return Status::not_finite;
-  if constexpr (!detail::is_vector<X>) {
-    const CovarianceOf<X> transport = detail::transport(belief.mean, e);
-    covariance = (transport * covariance * transport.transpose()).eval();
-  }
-  belief.mean = retract(belief.mean, e);
-  belief.covariance = symmetrised(covariance);
+  if (!(size <= static_cast<S>(settled))) return Status::not_converged;
+  const X mean = retract(belief.mean, e);
+  if constexpr (!detail::is_vector<X>)
+    updated = detail::column_product(detail::transport(belief.mean, e), updated);
+  const CovarianceOf<X> covariance = detail::squared_root<n, S>(updated);
+  if (!all_finite(covariance) || !detail::finite_state(mean)) return Status::not_finite;
+  belief.mean = mean;
+  belief.covariance = covariance;
   return Status::accepted;
 }
 

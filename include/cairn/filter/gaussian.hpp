@@ -5,11 +5,13 @@
 /// A belief: the mean of a state and the covariance of the step from the mean to the truth.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/random.hpp>
 #include <cairn/filter/elimination.hpp>
@@ -30,8 +32,8 @@ struct Gaussian {
   X mean;
   Covariance covariance;
 
-  /// The belief, after checking that the covariance is finite, symmetric (to 1e-9 of its diagonal) and
-  /// positive semi-definite and fits the mean. Throws Error naming the entry.
+  /// The belief, after checking that the covariance is finite, symmetric (to 1e-9 of the two standard
+  /// deviations, 1e-4 in float) and positive semi-definite and fits the mean. Throws Error naming the entry.
   [[nodiscard]] static Gaussian checked(const X& mean, const Covariance& covariance);
 };
 
@@ -58,81 +60,89 @@ template <Manifold X>
     return all_finite(manifold_traits<X>::local(x, x));
 }
 
+/// Cholesky's factor where every pivot is well above the rounding of its row, else false: `lower` is of no use
+/// then.
+template <int N, class S>
+[[nodiscard]] bool regular_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& lower) {
+  using std::sqrt;
+  const int n = static_cast<int>(a.rows());
+  lower = Matrix<N, N, S>::Zero(n, n);
+  for (int j = 0; j < n; ++j) {
+    for (int i = j; i < n; ++i) {
+      S sum = a(i, j);
+      for (int k = 0; k < j; ++k) sum -= lower(i, k) * lower(j, k);
+      lower(i, j) = sum;
+    }
+    const S pivot = lower(j, j);
+    if (!(pivot > rounding_share<S> * a(j, j)) || !(pivot <= std::numeric_limits<S>::max())) return false;
+    const S deviation = sqrt(pivot);
+    for (int i = j; i < n; ++i) lower(i, j) /= deviation;
+  }
+  return true;
+}
+
+/// Lower triangular L with L L^T = a for a symmetric positive semi-definite a; false, and zeros, where it is
+/// none.
+template <int N, class S>
+[[nodiscard]] bool checked_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& root) {
+  bool good = false;
+  if constexpr (N != dynamic)
+    good = covariance_root<N, S>(a, root);
+  else
+    good = regular_root<N, S>(a, root) || singular_root<N, S>(a, root);
+  if (!good) root.setZero();
+  return good;
+}
+
 template <int N, class S>
 [[nodiscard]] inline bool is_valid_covariance(const Matrix<N, N, S>& a) {
   if constexpr (N != dynamic) {
     return is_covariance<N, S>(a);
   } else {
-    const int n = static_cast<int>(a.rows());
-    Matrix<N, N, S> work = a;
-    const S slack = S(64) * std::numeric_limits<S>::epsilon();
-    bool good = all_finite(a);
-    for (int j = 0; j < n && good; ++j) {
-      const S pivot = work(j, j);
-      const S floor = slack * a(j, j);
-      good = pivot >= -floor && a(j, j) >= S(0);
-      for (int k = j + 1; k < n; ++k) {
-        if (pivot > floor)
-          work.col(k).tail(n - j) -= work.col(j).tail(n - j) * (work(k, j) / pivot);
-        else
-          good = good && work(k, j) * work(k, j) <= S(4) * slack * a(j, j) * a(k, k);
-      }
-    }
-    return good;
+    Matrix<N, N, S> lower;
+    PivotedRoot<N, S> root;
+    return regular_root<N, S>(a, lower) || pivoted_root<N, S>(a, root);
   }
 }
 
-/// Lower triangular L with L L^T = a for a symmetric positive semi-definite a; directions without variance
-/// give columns of zeros.
+/// The root of what is known to be a covariance.
 template <int N, class S>
 [[nodiscard]] Matrix<N, N, S> semi_definite_root(const Matrix<N, N, S>& a) {
-  using std::sqrt;
-  const int n = static_cast<int>(a.rows());
-  Matrix<N, N, S> lower = Matrix<N, N, S>::Zero(n, n);
-  if constexpr (N != dynamic) {
-    static_cast<void>(covariance_root<N, S>(a, lower));
-    return lower;
-  }
-  const S slack = S(64) * std::numeric_limits<S>::epsilon();
-  for (int j = 0; j < n; ++j) {
-    S pivot = a(j, j);
-    for (int k = 0; k < j; ++k) pivot -= lower(j, k) * lower(j, k);
-    if (!(pivot > slack * a(j, j))) continue;
-    lower(j, j) = sqrt(pivot);
-    for (int i = j + 1; i < n; ++i) {
-      S sum = a(i, j);
-      for (int k = 0; k < j; ++k) sum -= lower(i, k) * lower(j, k);
-      lower(i, j) = sum / lower(j, j);
-    }
-  }
-  return lower;
+  Matrix<N, N, S> root = a;
+  static_cast<void>(checked_root<N, S>(a, root));
+  return root;
 }
 
-/// The root of a covariance and whether it is one.
+/// The same for singular a; infinity where d leaves the directions in which a has variance by more than the
+/// deviation that rounding of a may have hidden, or a is no covariance.
 template <int N, class S>
-[[nodiscard]] bool checked_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& root) {
-  if constexpr (N != dynamic) {
-    return covariance_root<N, S>(a, root);
-  } else {
-    if (!is_valid_covariance<N, S>(a)) return false;
-    root = semi_definite_root<N, S>(a);
-    return true;
+[[nodiscard, gnu::cold, gnu::noinline]] S mahalanobis_of_singular(const Vector<N, S>& d,
+                                                                  const Matrix<N, N, S>& a) {
+  PivotedRoot<N, S> p;
+  if (!pivoted_root<N, S>(a, p)) return std::numeric_limits<S>::infinity();
+  Vector<N, S> left = d;
+  S sum(0);
+  for (int k = 0; k < p.rank; ++k) {
+    const S y = left(p.order(k)) / p.root(p.order(k), k);
+    sum += y * y;
+    for (int i = 0; i < static_cast<int>(d.size()); ++i) left(i) -= p.root(i, k) * y;
   }
+  for (int i = 0; i < static_cast<int>(d.size()); ++i)
+    if (!(left(i) * left(i) <= rounding_share<S> * a(i, i) * (S(1) + sum)))
+      return std::numeric_limits<S>::infinity();
+  return sum;
 }
 
-/// d^T a^-1 d for positive definite a; infinity where a is singular in a direction that d has.
+/// d^T a^-1 d of a covariance a; where that is singular, of its pseudo-inverse.
 template <int N, class S>
 [[nodiscard]] S squared_mahalanobis(const Vector<N, S>& d, const Matrix<N, N, S>& a) {
   const int n = static_cast<int>(a.rows());
-  const Matrix<N, N, S> lower = semi_definite_root<N, S>(a);
+  Matrix<N, N, S> lower;
+  if (!regular_root<N, S>(a, lower)) return mahalanobis_of_singular<N, S>(d, a);
   Vector<N, S> y = d;
   S sum(0);
   for (int i = 0; i < n; ++i) {
     for (int k = 0; k < i; ++k) y(i) -= lower(i, k) * y(k);
-    if (lower(i, i) == S(0)) {
-      if (y(i) != S(0)) return std::numeric_limits<S>::infinity();
-      continue;
-    }
     y(i) /= lower(i, i);
     sum += y(i) * y(i);
   }
@@ -144,6 +154,8 @@ template <int N, class S>
 template <Manifold X>
 Gaussian<X> Gaussian<X>::checked(const X& mean, const Covariance& covariance) {
   using std::abs;
+  using std::sqrt;
+  const Scalar tolerance = std::max(Scalar(1e-9), Scalar(1024) * std::numeric_limits<Scalar>::epsilon());
   const int n = dof_of(mean);
   const auto complain = [](const char* what, Eigen::Index i, const char* between, Eigen::Index j) {
     std::string text(what);  // appended piecewise: gcc 12 warns wrongly about "literal" + string
@@ -156,11 +168,13 @@ Gaussian<X> Gaussian<X>::checked(const X& mean, const Covariance& covariance) {
         covariance.rows(), ", numbers: ", n);
   if (!detail::finite_state(mean)) raise("Gaussian: the mean is not finite");
   for (int i = 0; i < n; ++i)
-    for (int j = 0; j < n; ++j) {
+    for (int j = 0; j < n; ++j)
       if (!detail::finite(covariance(i, j)))
         complain("Gaussian: covariance entry is not finite: row ", i, ", column ", j);
-      const Scalar scale = abs(covariance(i, i)) + abs(covariance(j, j));
-      if (abs(covariance(i, j) - covariance(j, i)) > Scalar(1e-9) * scale)
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) {
+      const Scalar scale = sqrt(abs(covariance(i, i))) * sqrt(abs(covariance(j, j)));
+      if (!(abs(covariance(i, j) - covariance(j, i)) <= tolerance * scale))
         complain("Gaussian: the covariance is not symmetric: row ", i, ", column ", j);
     }
   const Covariance symmetric = symmetrised(covariance);
@@ -169,20 +183,25 @@ Gaussian<X> Gaussian<X>::checked(const X& mean, const Covariance& covariance) {
   return {mean, symmetric};
 }
 
-/// Normalised estimation error squared of the belief at `truth`: d^T P^-1 d with d = local(mean, truth);
-/// chi-square of dof numbers for a consistent filter.
+/// Normalised estimation error squared of the belief at `truth`: d^T P^-1 d with d = local(mean, truth). For a
+/// consistent filter it is chi-square of as many degrees of freedom as P has rank: dof where P is regular.
+/// Where P is singular its pseudo-inverse stands for P^-1, and the result is infinity for an error in a
+/// direction without variance, one that exceeds the deviation that the rounding of P may hide.
 template <Manifold X>
 [[nodiscard]] ScalarOf<X> nees(const Gaussian<X>& belief, const X& truth) {
   const Tangent<X> d = local(belief.mean, truth);
   return detail::squared_mahalanobis<dof<X>, ScalarOf<X>>(d, belief.covariance);
 }
 
-/// A state drawn from the belief.
+/// A state drawn from the belief, whose covariance may be singular but must be one.
 template <Manifold X>
 [[nodiscard]] X sample(const Gaussian<X>& belief, Random& random) {
   Tangent<X> d = manifold_traits<X>::local(belief.mean, belief.mean);
   for (int i = 0; i < static_cast<int>(d.size()); ++i) d(i) = static_cast<ScalarOf<X>>(random.normal());
-  const Tangent<X> step = detail::semi_definite_root<dof<X>, ScalarOf<X>>(belief.covariance) * d;
+  CovarianceOf<X> root = belief.covariance;
+  const bool good = detail::checked_root<dof<X>, ScalarOf<X>>(belief.covariance, root);
+  CAIRN_EXPECTS(good, "sample needs a covariance: finite, symmetric and positive semi-definite");
+  const Tangent<X> step = root * d;
   return retract(belief.mean, step);
 }
 

@@ -5,10 +5,14 @@
 /// The information filter: the belief as Y = P^-1 and y = Y d, about a point x of linearisation.
 ///
 ///   update    Y <- Y + H^T R^-1 H,   y <- y + H^T R^-1 (z (-) h(x))          a sum: sensors in any order
-///   predict   M = F^-T Y F^-1,   Y <- M - M G (I + G^T M G)^-1 G^T M,   Q = G G^T
-/// (Maybeck, "Stochastic Models, Estimation, and Control", vol. 1, 5.7.) Y may be singular: a state nobody
-/// has seen has zero information, and no prior is needed. Many numbers of one measurement cost one small sum
-/// each. Loses digits where H^T R^-1 H swamps Y where the square-root form keeps them.
+///   predict   Y <- (F Y^-1 F^T + Q)^-1, also where Y has no inverse: by the array
+///             [I 0 0; -C F^-1 G  C F^-1  b] -> [* * *; 0 C' b'],   Y = C^T C,  y = C^T b,  Q = G G^T
+/// (Maybeck, "Stochastic Models, Estimation, and Control", vol. 1, 5.7; Bierman, "Factorization Methods for
+/// Discrete Sequential Estimation", 1977, VI.) Y may be singular: a state nobody has seen has zero information,
+/// and no prior is needed. Many numbers of one measurement cost one small sum each. What is less than the
+/// rounding of Y says nothing: where H^T R^-1 H swamps Y by more than its digits, the weaker directions count
+/// as unknown, and there is no mean and no covariance until they are seen. The square-root form keeps twice as
+/// many digits.
 #pragma once
 
 #include <cmath>
@@ -18,7 +22,10 @@
 #include <utility>
 
 #include <cairn/core/cholesky.hpp>
+#include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/array_update.hpp>
+#include <cairn/filter/correct.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
@@ -28,51 +35,34 @@
 
 namespace cairn::inline CAIRN_ABI {
 
-/// Truth = retract(point, d); the density of d is exp(-(d^T Y d) / 2 + y^T d). Y may be singular.
-template <Manifold X>
-struct InformationBelief {
-  X point;
-  CovarianceOf<X> information;
-  Tangent<X> vector;
-
-  /// Nothing known, linearised at `x`.
-  [[nodiscard]] static InformationBelief ignorant(const X& x) {
-    const int n = dof_of(x);
-    return {x, CovarianceOf<X>::Zero(n, n), Tangent<X>::Zero(n)};
-  }
-  /// The same belief in information form; nothing where the covariance is singular.
-  [[nodiscard]] static std::optional<InformationBelief> from(const Gaussian<X>& belief) {
-    const int n = dof_of(belief.mean);
-    const Cholesky<dof<X>, ScalarOf<X>> root(belief.covariance);
-    if (!root.good()) return std::nullopt;
-    return InformationBelief{belief.mean, root.inverse(), Tangent<X>::Zero(n)};
-  }
-  /// Mean and covariance; nothing while some direction has no information.
-  [[nodiscard]] std::optional<Gaussian<X>> gaussian() const {
-    const Cholesky<dof<X>, ScalarOf<X>> root(information);
-    if (!root.good()) return std::nullopt;
-    Gaussian<X> result{retract(point, root.solve(vector)), root.inverse()};
-    if (!all_finite(result.covariance) || !detail::finite_state(result.mean)) return std::nullopt;
-    return result;
-  }
-};
-
 namespace detail {
 
-/// Solves a x = b for square a by elimination with row pivots; false where a is singular.
+/// Solves a x = b for square a by elimination with row pivots, in units of the rows' largest entries; false
+/// where a is singular to rounding.
 template <int N, int C, class S>
 [[nodiscard]] bool solve_square(Matrix<N, N, S> a, Matrix<N, C, S>& b) {
   using std::abs;
   const int n = static_cast<int>(a.rows());
   const int columns = static_cast<int>(b.cols());
+  Vector<N, S> scale = Vector<N, S>::Zero(n);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < n; ++j)
+      if (abs(a(i, j)) > scale(i)) scale(i) = abs(a(i, j));
+    if (!(scale(i) > S(0))) return false;
+  }
+  Vector<N, S> size = Vector<N, S>::Zero(n);  // of the columns
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j)
+      if (abs(a(i, j)) > size(j) * scale(i)) size(j) = abs(a(i, j)) / scale(i);
   for (int j = 0; j < n; ++j) {
     int best = j;
     for (int i = j + 1; i < n; ++i)
-      if (abs(a(i, j)) > abs(a(best, j))) best = i;
-    if (!(abs(a(best, j)) > S(0))) return false;
+      if (abs(a(i, j)) * scale(best) > abs(a(best, j)) * scale(i)) best = i;
+    if (!(abs(a(best, j)) > rounding_share<S> * size(j) * scale(best))) return false;
     if (best != j) {
       for (int k = j; k < n; ++k) std::swap(a(j, k), a(best, k));
       for (int k = 0; k < columns; ++k) std::swap(b(j, k), b(best, k));
+      std::swap(scale(j), scale(best));
     }
     for (int i = j + 1; i < n; ++i) {
       const S factor = a(i, j) / a(j, j);
@@ -88,7 +78,192 @@ template <int N, int C, class S>
   return true;
 }
 
+/// a^-1 of a covariance or an information; false where it would not have three digits: what the other numbers
+/// leave of one, 1 / (a_ii a^-1_ii), is near its rounding.
+template <int N, class S>
+[[nodiscard]] bool sound_inverse(const Matrix<N, N, S>& a, Matrix<N, N, S>& inverse) {
+  const Cholesky<N, S> root(a);
+  if (!root.good()) return false;
+  inverse = root.inverse();
+  for (int i = 0; i < static_cast<int>(a.rows()); ++i)
+    if (!(digits_left<S> * a(i, i) * inverse(i, i) < S(1))) return false;
+  return true;
+}
+
+/// C^T with Y = C^T C, and in place of y the b with y = C^T b; false where Y is none. Not triangular where Y is
+/// singular.
+template <int N, class S>
+[[nodiscard]] bool information_root(const Matrix<N, N, S>& information, Matrix<N, N, S>& root,
+                                    Vector<N, S>& vector) {
+  const int n = static_cast<int>(vector.size());
+  PivotedRoot<N, S> pivoted;
+  const bool regular = regular_root<N, S>(information, root);
+  if (!regular && !pivoted_root<N, S>(information, pivoted)) return false;
+  if (!regular) root = pivoted.root;
+  Vector<N, S> left = vector;
+  vector.setZero();
+  for (int k = 0; k < (regular ? n : pivoted.rank); ++k) {
+    const int row = regular ? k : pivoted.order(k);
+    vector(k) = left(row) / root(row, k);
+    for (int i = 0; i < n; ++i) left(i) -= root(i, k) * vector(k);
+  }
+  return true;
+}
+
+/// Inverse of an upper triangular matrix; false where what the other numbers leave of one, the reciprocal of
+/// its column's length times its inverse row's, is near its rounding.
+template <int N, class S>
+[[nodiscard]] bool invert_upper(const Matrix<N, N, S>& root, Matrix<N, N, S>& inverse) {
+  using std::sqrt;
+  const int n = static_cast<int>(root.rows());
+  inverse = Matrix<N, N, S>::Identity(n, n);
+  for (int i = n - 1; i >= 0; --i) {
+    if (!(root(i, i) > S(0))) return false;
+    for (int j = i; j < n; ++j) {
+      for (int k = i + 1; k <= j; ++k) inverse(i, j) -= root(i, k) * inverse(k, j);
+      inverse(i, j) /= root(i, i);
+    }
+  }
+  for (int i = 0; i < n; ++i) {
+    S column(0), row(0);
+    for (int k = 0; k <= i; ++k) column += root(k, i) * root(k, i);
+    for (int k = i; k < n; ++k) row += inverse(i, k) * inverse(i, k);
+    if (!(digits_left<S> * sqrt(column) * sqrt(row) < S(1))) return false;
+  }
+  return true;
+}
+
+/// C and b of a density exp(-|C d - b|^2 / 2) after a prediction by F and Q; C comes back upper triangular.
+/// Refused: a singular F; an F, or a Q of lower rank, that would let the rounding of what is known best or
+/// worst swamp what is known in other directions.
+template <int N, class S>
+[[nodiscard]] Status predict_root(Matrix<N, N, S>& root, Vector<N, S>& vector, Matrix<N, N, S> f,
+                                  const Matrix<N, N, S>& q, double fading) {
+  using std::abs;
+  using std::sqrt;
+  const int n = static_cast<int>(vector.size());
+  const S faded = sqrt(static_cast<S>(fading));
+  f *= faded;
+  Matrix<N, N, S> moved = transposed<N, N, S>(root);  // (C F^-1)^T solves F^T x = C^T
+  Matrix<N, N, S> back = Matrix<N, N, S>::Identity(n, n);  // F^-T
+  if (!solve_square<N, N, S>(transposed<N, N, S>(f), moved) ||
+      !solve_square<N, N, S>(transposed<N, N, S>(f), back))
+    return Status::not_positive_definite;
+  Vector<N, S> sums = Vector<N, S>::Zero(n);  // of magnitudes that make up a column of C F^-1
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) {
+      S sum(0);
+      for (int k = 0; k < n; ++k) sum += abs(root(i, k)) * abs(back(j, k));
+      if (sum > sums(j)) sums(j) = sum;
+    }
+  const Matrix<N, N, S> moved_root = transposed<N, N, S>(moved);
+  const Matrix<N, N, S> g = semi_definite_root<N, S>(q);
+  const Matrix<N, N, S> of_noise = column_product(moved_root, g);
+  S largest(0);  // of the sums that make up C F^-1 G
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) {
+      S sum(0);
+      for (int k = 0; k < n; ++k) sum += abs(moved_root(i, k)) * abs(g(k, j));
+      if (sum > largest) largest = sum;
+    }
+  constexpr int width = N == dynamic ? dynamic : 2 * N + 1;
+  // Rows that say much about the noise come first: below others, what is left of them would be a difference of
+  // nearly equal numbers (A. Cox, N. Higham, "Stability of Householder QR factorization for weighted least
+  // squares problems", 1998).
+  Matrix<width, width, S> array = Matrix<width, width, S>::Zero(2 * n + 1, 2 * n + 1);
+  Vector<N, S> size = Vector<N, S>::Zero(n);
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j < n; ++j) size(i) += abs(of_noise(i, j));
+  int row = 0;
+  Vector<N, S> waits = Vector<N, S>::Ones(n);
+  const auto put_rows = [&](const S& least) {
+    for (;;) {
+      int best = -1;
+      for (int i = 0; i < n; ++i)
+        if (waits(i) > S(0) && size(i) >= (best < 0 ? least : size(best))) best = i;
+      if (best < 0) return;
+      waits(best) = S(0);
+      array(row, 2 * n) = vector(best) / faded;
+      for (int j = 0; j < n; ++j) {
+        array(row, j) = -of_noise(best, j);
+        array(row, n + j) = moved_root(best, j);
+      }
+      ++row;
+    }
+  };
+  put_rows(S(1));
+  for (int j = 0; j < n; ++j) array(row++, j) = S(1);
+  put_rows(S(0));
+  if (row != 2 * n) return Status::not_finite;
+  triangularise(array);
+  // What the noise swamps in one direction must not reach another by its rounding.
+  S least = array(0, 0);
+  for (int j = 1; j < n; ++j)
+    if (array(j, j) < least) least = array(j, j);
+  if (!(largest * digits_left<S> <= least)) return Status::not_positive_definite;
+  for (int j = 0; j < n; ++j) {
+    vector(j) = array(n + j, 2 * n);
+    for (int i = 0; i < n; ++i) root(i, j) = array(n + i, n + j);
+  }
+  S error(0);  // of C F^-1 in the deviations that are left, where there are any
+  if (invert_upper<N, S>(root, moved))
+    for (int j = 0; j < n; ++j) {
+      S variance(0);
+      for (int k = j; k < n; ++k) variance += moved(j, k) * moved(j, k);
+      error += sums(j) * sqrt(variance);
+    }
+  return error * digits_left<S> <= S(4) ? Status::accepted : Status::not_positive_definite;
+}
+
 }  // namespace detail
+
+/// Truth = retract(point, d); the density of d is exp(-(d^T Y d) / 2 + y^T d). Y may be singular.
+template <Manifold X>
+struct InformationBelief {
+  using State = X;
+  X point;
+  CovarianceOf<X> information;
+  Tangent<X> vector;
+
+  /// Nothing known, linearised at `x`.
+  [[nodiscard]] static InformationBelief ignorant(const X& x) {
+    const int n = dof_of(x);
+    return {x, CovarianceOf<X>::Zero(n, n), Tangent<X>::Zero(n)};
+  }
+  /// The same belief in information form; nothing where the covariance is singular, or so nearly that its
+  /// inverse would not have three digits.
+  [[nodiscard]] static std::optional<InformationBelief> from(const Gaussian<X>& belief) {
+    using S = ScalarOf<X>;
+    const int n = dof_of(belief.mean);
+    InformationBelief result{belief.mean, belief.covariance, Tangent<X>::Zero(n)};
+    if (!detail::sound_inverse<dof<X>, S>(belief.covariance, result.information)) return std::nullopt;
+    return result;
+  }
+  /// Mean and covariance; nothing while some direction has no information beyond the rounding of Y.
+  [[nodiscard]] std::optional<Gaussian<X>> gaussian() const {
+    Gaussian<X> result{point, information};
+    Tangent<X> d = vector;
+    if (!solve(result.covariance, d)) return std::nullopt;
+    result.mean = retract(point, d);
+    if (!all_finite(result.covariance) || !detail::finite_state(result.mean)) return std::nullopt;
+    return result;
+  }
+
+  /// Y^-1 and the step to the mean; false where that would not have three digits of its standard deviations.
+  [[nodiscard]] bool solve(CovarianceOf<X>& inverse, Tangent<X>& step) const {
+    using S = ScalarOf<X>;
+    using std::abs;
+    using std::sqrt;
+    if (!detail::sound_inverse<dof<X>, S>(information, inverse)) return false;
+    step = detail::column_product(inverse, vector);
+    S size(0), most(1);  // of the step, in the deviations that each number has given the others
+    for (int i = 0; i < static_cast<int>(step.size()); ++i) {
+      size += sqrt(information(i, i)) * abs(step(i));
+      if (information(i, i) * inverse(i, i) > most) most = information(i, i) * inverse(i, i);
+    }
+    return S(4) * size * sqrt(most) * detail::digits_left<S> <= S(1);
+  }
+};
 
 /// Information filter for linear and linearised models. Options only.
 struct InformationFilter {
@@ -96,7 +271,7 @@ struct InformationFilter {
   double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
 
   /// Moves the belief by one step of dt. The mean of what is known is moved by the process first, so the
-  /// point of linearisation follows the estimate. Refused: a singular F.
+  /// point of linearisation follows the estimate. Refused: a singular F, a Q that is no covariance.
   template <LinearisedProcess F>
   Status predict(InformationBelief<typename F::State>& belief, const F& process,
                  const typename F::Control& control, double dt) const {
@@ -109,26 +284,20 @@ struct InformationFilter {
     const int size = static_cast<int>(next.vector.size());
     const CovarianceOf<X> f = detail::dense_of(process.jacobian(next.point, control, dt));
     CovarianceOf<X> q = process.noise(next.point, control, dt);
-    CovarianceOf<X> inverse = CovarianceOf<X>::Identity(size, size);
     if (f.rows() != size || q.rows() != size) return Status::size_mismatch;
-    if (!(fading >= 1.0) || !(stabilising_noise >= 0.0)) return Status::bad_option;
-    for (int i = 0; i < size; ++i) q(i, i) += static_cast<S>(stabilising_noise);
-    const CovarianceOf<X> g = detail::semi_definite_root<n, S>(q);
-    if (!all_finite(f) || !all_finite(q)) return Status::not_finite;
-    if (!detail::solve_square<n, n, S>(f, inverse)) return Status::not_positive_definite;
-    const CovarianceOf<X> back = transposed<n, n, S>(inverse) / static_cast<S>(fading);
-    const CovarianceOf<X> m =
-        symmetrised(detail::column_product(back, detail::column_product(next.information, inverse)));
-    const Tangent<X> y = detail::column_product(back, next.vector);
-    const CovarianceOf<X> gt = transposed<n, n, S>(g);
-    const CovarianceOf<X> mg = detail::column_product(m, g);
-    CovarianceOf<X> inner = detail::column_product(gt, mg);
-    for (int i = 0; i < size; ++i) inner(i, i) += S(1);
-    const Cholesky<n, S> root(inner);
-    if (!root.good()) return Status::not_positive_definite;
-    const CovarianceOf<X> lost = detail::column_product(mg, root.solve(transposed<n, n, S>(mg)));
-    next.information = symmetrised(m - lost);
-    next.vector = y - detail::column_product(mg, root.solve(detail::column_product(gt, y)));
+    if (!all_finite(f) || !all_finite(next.information) || !all_finite(next.vector))
+      return Status::not_finite;
+    Status status = detail::stabilise<X>(q, fading, stabilising_noise);
+    CovarianceOf<X> root = next.information;  // C^T
+    Tangent<X> b = next.vector;
+    if (status == Status::accepted && !detail::information_root<n, S>(next.information, root, b))
+      status = Status::not_positive_definite;
+    if (status != Status::accepted) return status;
+    root = transposed<n, n, S>(root);
+    status = detail::predict_root<n, S>(root, b, f, q, fading);
+    if (status != Status::accepted) return status;
+    next.information = detail::squared_root<n, S>(transposed<n, n, S>(root));
+    next.vector = detail::column_product(transposed<n, n, S>(root), b);
     next.point = process.propagate(next.point, control, dt);
     return keep(belief, next);
   }
@@ -151,8 +320,8 @@ struct InformationFilter {
     const Vector<m, S> residual = local(Z(sensor.predict(belief.point)), z);
     if (h.cols() != belief.vector.size() || h.rows() != residual.size()) return Status::size_mismatch;
     const Cholesky<m, S> root(r);
-    if (!root.good() || !all_finite(r))
-      return all_finite(r) ? Status::not_positive_definite : Status::not_finite;
+    if (!all_finite(r)) return Status::not_finite;
+    if (!root.good() || !(root.least_share() > detail::digits_left<S>)) return Status::not_positive_definite;
     const Matrix<m, dof<X>, S> white = root.whiten(h);
     InformationBelief<X> next = belief;
     add_transposed_product(next.information, white, white);
@@ -163,10 +332,9 @@ struct InformationFilter {
   /// Moves the point of linearisation to the mean; false, and nothing changed, while that is unknown.
   template <Manifold X>
   static bool recentre(InformationBelief<X>& belief) {
-    const Cholesky<dof<X>, ScalarOf<X>> root(belief.information);
-    if (!root.good()) return false;
-    const Tangent<X> d = root.solve(belief.vector);
-    if (!all_finite(d)) return false;
+    CovarianceOf<X> inverse = belief.information;
+    Tangent<X> d = belief.vector;
+    if (!belief.solve(inverse, d) || !all_finite(d)) return false;
     belief.point = retract(belief.point, d);
     belief.vector.setZero();
     return true;
@@ -177,9 +345,10 @@ private:
   static Status keep(InformationBelief<X>& belief, const InformationBelief<X>& next) {
     if (!all_finite(next.information) || !all_finite(next.vector) || !detail::finite_state(next.point))
       return Status::not_finite;
-    if (!detail::is_valid_covariance<dof<X>, ScalarOf<X>>(symmetrised(next.information)))
-      return Status::not_positive_definite;
+    const CovarianceOf<X> symmetric = symmetrised(next.information);
+    if (!detail::is_valid_covariance<dof<X>, ScalarOf<X>>(symmetric)) return Status::not_positive_definite;
     belief = next;
+    belief.information = symmetric;
     return Status::accepted;
   }
 };

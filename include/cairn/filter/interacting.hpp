@@ -18,6 +18,7 @@
 #include <tuple>
 #include <utility>
 
+#include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/filter/gaussian.hpp>
@@ -36,10 +37,27 @@ struct ModeBelief {
   /// One Gaussian with the mixture's mean (two rounds of tangent averaging) and covariance.
   [[nodiscard]] Gaussian<X> combined() const { return mixture(modes, probability); }
 
-  /// The moments of a mixture with the given weights.
+  /// The probabilities are numbers from 0 to 1 that sum to 1, within 1e-6. Otherwise: not_finite, depleted
+  /// where none is above zero, bad_weights.
+  [[nodiscard]] Status weighed() const noexcept { return judge(probability); }
+  [[nodiscard]] static Status judge(const std::array<double, R>& weights) noexcept {
+    double sum = 0.0;
+    bool negative = false;
+    for (const double w : weights) {
+      negative = negative || w < 0.0;
+      sum += w;
+    }
+    if (!std::isfinite(sum)) return Status::not_finite;
+    if (negative) return Status::bad_weights;
+    if (!(sum > 0.0)) return Status::depleted;
+    return std::abs(sum - 1.0) <= 1e-6 ? Status::accepted : Status::bad_weights;
+  }
+
+  /// The moments of a mixture with the given weights, at least zero and of sum 1.
   [[nodiscard]] static Gaussian<X> mixture(const std::array<Gaussian<X>, R>& parts,
                                            const std::array<double, R>& weights) {
     using S = ScalarOf<X>;
+    CAIRN_EXPECTS(judge(weights) == Status::accepted, "a mixture needs weights from 0 to 1 that sum to 1");
     std::size_t heaviest = 0;
     for (std::size_t i = 1; i < R; ++i)
       if (weights[i] > weights[heaviest]) heaviest = i;
@@ -64,13 +82,15 @@ struct Interacting {
   Filter filter{};
   std::array<std::array<double, R>, R> switching{};
 
-  /// Mixes, then moves every mode by its own process of `processes`. All or none are kept.
+  /// Mixes, then moves every mode by its own process of `processes`. All or none are kept. Refused: rows of
+  /// `switching` that do not sum to 1 (bad_option), probabilities that are none (see ModeBelief::weighed).
   template <Manifold X, class... F>
     requires(sizeof...(F) == R)
   Status predict(ModeBelief<X, R>& belief, const std::tuple<F...>& processes,
                  const typename std::tuple_element_t<0, std::tuple<F...>>::Control& control,
                  double dt) const {
     if (!stochastic()) return Status::bad_option;
+    if (const Status status = belief.weighed(); status != Status::accepted) return status;
     ModeBelief<X, R> next = belief;
     for (std::size_t j = 0; j < R; ++j) {
       std::array<double, R> weights{};
@@ -88,6 +108,9 @@ struct Interacting {
                      : filter.predict(next.modes[J], std::get<J>(processes), control, dt)),
        ...);
     }(std::make_index_sequence<R>{});
+    double sum = 0.0;
+    for (const double p : next.probability) sum += p;
+    for (double& p : next.probability) p /= sum;  // rounding does not gather over a million predictions
     if (status == Status::accepted) belief = next;
     return status;
   }
@@ -97,6 +120,7 @@ struct Interacting {
   template <MeasurementModel H>
   Status update(ModeBelief<typename H::State, R>& belief, const H& sensor,
                 const typename H::Measurement& z) const {
+    if (const Status status = belief.weighed(); status != Status::accepted) return status;
     ModeBelief<typename H::State, R> next = belief;
     std::array<double, R> weight{};
     Status first_refusal = Status::accepted;

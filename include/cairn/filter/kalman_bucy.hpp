@@ -9,8 +9,11 @@
 ///   x' = f(x, u) + K (z - h(x)),   P' = A P + P A^T + Q - K R K^T,   K = P H^T R^-1        (covariance)
 ///   Y' = -Y A - A^T Y - Y Q Y + H^T R^-1 H                                                 (information)
 /// (R. E. Kalman, R. S. Bucy, "New results in linear filtering and prediction theory", 1961), integrated by
-/// the classical Runge-Kutta rule in `steps` equal parts. Measurements at instants go through Kalman,
-/// Extended or InformationFilter: together that is the continuous-discrete filter.
+/// the classical Runge-Kutta rule in `steps` equal parts at first: each is done whole and in halves, and where
+/// the two differ by more than the tolerance the part is halved (E. Hairer, S. Norsett, G. Wanner, "Solving
+/// Ordinary Differential Equations I", II.4). An explicit rule needs a part for every few time constants of the
+/// filter. Measurements at instants go through Kalman, Extended or InformationFilter: together that is the
+/// continuous-discrete filter.
 ///
 /// ```cpp
 /// struct Drifting {
@@ -22,11 +25,14 @@
 /// ```
 #pragma once
 
+#include <cmath>
 #include <concepts>
 #include <limits>
 
 #include <cairn/core/cholesky.hpp>
+#include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/correct.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/information.hpp>
 #include <cairn/filter/model.hpp>
@@ -49,9 +55,12 @@ concept ContinuousProcess = Manifold<typename F::State> &&
                             };
 
 /// Kalman-Bucy filter. Options only. For states that are not vectors the rate is taken in the tangent space
-/// at the start of each part.
+/// at the start of each part. Refused: not_converged, where most_parts do not do; a spectral density that is no
+/// covariance at the start, a sensor's that is not positive definite.
 struct KalmanBucy {
-  int steps = 1;  ///< Runge-Kutta parts of one call; >= 1
+  int steps = 1;            ///< Runge-Kutta parts of one call to begin with; >= 1
+  double tolerance = 1e-6;  ///< of one part, in standard deviations; > 0
+  int most_parts = 100000;  ///< of one call, those that were too long included; >= 1
 
   /// Moves the belief by dt without measurement.
   template <ContinuousProcess F>
@@ -65,7 +74,8 @@ struct KalmanBucy {
       return Rates<X>{process.rate(x, control),
                       P(ap + ap.transpose() + process.spectral_density(x, control))};
     };
-    return integrate(belief.mean, belief.covariance, rate, dt);
+    if (const Status status = judge(process, belief.mean, control); status != Status::accepted) return status;
+    return integrate<Matrices::covariances>(belief.mean, belief.covariance, rate, dt);
   }
 
   /// Moves the belief by dt while the sensor reports z, held constant; sensor.noise() is a spectral density.
@@ -82,7 +92,9 @@ struct KalmanBucy {
       return Rates<X>{process.rate(x, control) + pull,
                       P(ap + ap.transpose() + process.spectral_density(x, control) - p * seen.matrix * p)};
     };
-    return integrate(belief.mean, belief.covariance, rate, dt);
+    if (const Status status = judge(process, belief.mean, control); status != Status::accepted) return status;
+    if (const Status status = judge(sensor, belief.mean); status != Status::accepted) return status;
+    return integrate<Matrices::covariances>(belief.mean, belief.covariance, rate, dt);
   }
 
   /// The same in information form: point and Y move together, y is zero throughout. Y must be positive
@@ -103,12 +115,33 @@ struct KalmanBucy {
       return Rates<X>{process.rate(x, control) + pull,
                       P(seen.matrix - ya - ya.transpose() - y * process.spectral_density(x, control) * y)};
     };
-    const Status status = integrate(next.point, next.information, rate, dt);
+    Status status = judge(process, next.point, control);
+    if (status == Status::accepted) status = judge(sensor, next.point);
+    if (status == Status::accepted)
+      status = integrate<Matrices::informations>(next.point, next.information, rate, dt);
     if (status == Status::accepted) belief = next;
     return status;
   }
 
 private:
+  enum class Matrices { covariances, informations };
+
+  template <class F, Manifold X, class U>
+  static Status judge(const F& process, const X& x, const U& control) {
+    const CovarianceOf<X> q = process.spectral_density(x, control);
+    return detail::judge_noise<dof<X>, ScalarOf<X>>(q);
+  }
+  template <class H, Manifold X>
+  static Status judge(const H& sensor, const X& x) {
+    using S = ScalarOf<X>;
+    constexpr int m = dof<typename H::Measurement>;
+    const Matrix<m, m, S> r = sensor.noise(x);
+    if (!all_finite(r)) return Status::not_finite;
+    const Cholesky<m, S> root(r);
+    return root.good() && root.least_share() > detail::digits_left<S> ? Status::accepted
+                                                                      : Status::not_positive_definite;
+  }
+
   template <Manifold X>
   struct Rates {
     Tangent<X> state;
@@ -128,27 +161,85 @@ private:
     return {h.transpose() * root.solve(residual), h.transpose() * root.solve(h)};
   }
 
+  /// One part of the rule.
   template <Manifold X, class Rate>
-  Status integrate(X& state, CovarianceOf<X>& matrix, const Rate& rate, double dt) const {
+  static void advance(X& x, CovarianceOf<X>& p, const Rate& rate, ScalarOf<X> h) {
     using S = ScalarOf<X>;
-    if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
-    if (steps < 1) return Status::bad_option;
-    const S h = static_cast<S>(dt / steps);
-    X x = state;
-    CovarianceOf<X> p = matrix;
     const auto at = [&](const Rates<X>& k, S by) {
       return rate(retract(x, Tangent<X>(by * k.state)), CovarianceOf<X>(p + by * k.matrix));
     };
-    for (int part = 0; part < steps; ++part) {
-      const Rates<X> k1 = rate(x, p);
-      const Rates<X> k2 = at(k1, h / S(2));
-      const Rates<X> k3 = at(k2, h / S(2));
-      const Rates<X> k4 = at(k3, h);
-      x = retract(x, Tangent<X>(h / S(6) * (k1.state + S(2) * (k2.state + k3.state) + k4.state)));
-      p = symmetrised(p + h / S(6) * (k1.matrix + S(2) * (k2.matrix + k3.matrix) + k4.matrix));
+    const Rates<X> k1 = rate(x, p);
+    const Rates<X> k2 = at(k1, h / S(2));
+    const Rates<X> k3 = at(k2, h / S(2));
+    const Rates<X> k4 = at(k3, h);
+    x = retract(x, Tangent<X>(h / S(6) * (k1.state + S(2) * (k2.state + k3.state) + k4.state)));
+    p = symmetrised(p + h / S(6) * (k1.matrix + S(2) * (k2.matrix + k3.matrix) + k4.matrix));
+  }
+
+  /// How far two results are apart, in standard deviations of the second; infinity where one is no number.
+  /// What rounding of the way from (start, before) may explain does not count.
+  template <Matrices Kept, Manifold X>
+  static ScalarOf<X> distance(const X& start, const CovarianceOf<X>& before, const X& x,
+                              const CovarianceOf<X>& p, const X& to, const CovarianceOf<X>& after) {
+    using S = ScalarOf<X>;
+    using std::abs;
+    using std::sqrt;
+    constexpr S rounding = S(64) * std::numeric_limits<S>::epsilon();
+    if (!all_finite(p) || !all_finite(after) || !detail::finite_state(x) || !detail::finite_state(to))
+      return std::numeric_limits<S>::infinity();
+    const Tangent<X> gap = local(x, to), way = local(start, to);
+    const int n = static_cast<int>(gap.size());
+    S worst(0);
+    const auto note = [&](S error, S allowed, S unit) {
+      error = abs(error) - allowed;
+      if (error > S(0) && !(error <= worst * unit)) worst = error / unit;
+    };
+    for (int i = 0; i < n; ++i) {
+      S size = abs(way(i));
+      if constexpr (detail::is_vector<X>) size += abs(to(i));
+      const S root = after(i, i) > S(0) ? S(sqrt(after(i, i))) : S(0);
+      note(gap(i), rounding * size, Kept == Matrices::covariances ? root : S(1) / root);
+      for (int j = 0; j <= i; ++j) {
+        const S unit = root * (after(j, j) > S(0) ? S(sqrt(after(j, j))) : S(0));
+        const S old = sqrt(abs(before(i, i))) * sqrt(abs(before(j, j)));
+        note(p(i, j) - after(i, j), rounding * (unit + old), unit);
+      }
     }
-    if (!all_finite(p) || !detail::finite_state(x)) return Status::not_finite;
-    if (!detail::is_valid_covariance<dof<X>, S>(p)) return Status::not_positive_definite;
+    return worst;
+  }
+
+  template <Matrices Kept, Manifold X, class Rate>
+  Status integrate(X& state, CovarianceOf<X>& matrix, const Rate& rate, double dt) const {
+    using S = ScalarOf<X>;
+    if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
+    if (steps < 1 || most_parts < 1 || !(tolerance > 0.0)) return Status::bad_option;
+    if (!all_finite(matrix) || !detail::finite_state(state)) return Status::not_finite;
+    if (!detail::is_valid_covariance<dof<X>, S>(matrix)) return Status::not_positive_definite;
+    X x = state;
+    CovarianceOf<X> p = matrix;
+    double time = 0.0, part = dt / steps;
+    int parts = 0, kept = 0;
+    const auto limit = static_cast<S>(tolerance);
+    while (time < dt) {
+      if (++parts > most_parts || !(time + part > time)) return Status::not_converged;
+      const bool last = !(time + part * (1.0 + 1e-9) < dt);
+      const S h = static_cast<S>(last ? dt - time : part);
+      X whole = x, halves = x;
+      CovarianceOf<X> whole_p = p, halves_p = p;
+      advance(whole, whole_p, rate, h);
+      advance(halves, halves_p, rate, h / S(2));
+      advance(halves, halves_p, rate, h / S(2));
+      const S error = distance<Kept>(x, p, whole, whole_p, halves, halves_p);
+      if (!(error <= limit) || !detail::is_valid_covariance<dof<X>, S>(halves_p)) {
+        part = static_cast<double>(h) / 2;
+        kept = 0;
+        continue;
+      }
+      x = halves;
+      p = halves_p;
+      time = last ? dt : time + part;
+      if (++kept > 4 && error < limit / S(64) && 2 * part <= dt / steps) part *= 2;
+    }
     state = x;
     matrix = p;
     return Status::accepted;

@@ -11,8 +11,10 @@
 /// Run-time sizes go through Eigen (correct.hpp).
 #pragma once
 
+#include <array>
 #include <cstddef>
 
+#include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/column.hpp>
 #include <cairn/filter/column_shapes.hpp>
@@ -185,6 +187,55 @@ template <class A, int N, class S, class Q>
     add_product<ProductRows::lower>(a, u, out);
     mirror_lower(out);
   }
+}
+
+/// Where the triangular factor of a symmetric structured matrix may hold anything: its pattern on and below
+/// the diagonal, filled in by the elimination of its first columns.
+template <class Q, int N>
+[[nodiscard]] consteval auto filled_below() {
+  std::array<std::array<bool, N>, N> filled{};
+  for (const Entry& entry : Q::entries)
+    filled[static_cast<std::size_t>(entry.row)][static_cast<std::size_t>(entry.column)] = true;
+  for (std::size_t j = 0; j < N; ++j)
+    for (std::size_t i = j + 1; i < N; ++i)
+      for (std::size_t k = j + 1; k <= i; ++k) filled[i][k] = filled[i][k] || (filled[i][j] && filled[k][j]);
+  return filled;
+}
+
+/// Elimination of a symmetric structured matrix meets pivots alone that are well above rounding, or zeros in
+/// a column of zeros: it is a covariance. False says nothing. Number by number, without its zeros.
+template <class Q>
+[[gnu::always_inline]] [[nodiscard]] inline bool eliminates(const Q& q) {
+  using S = typename Q::Scalar;
+  constexpr int n = Q::row_count;
+  [[maybe_unused]] static constexpr auto filled = filled_below<Q, n>();
+  S a[n][n]{};  // a[j][i] = Q(i, j) on and below the diagonal
+  unrolled<Q::entries.size()>([&](auto e) __attribute__((always_inline)) {
+    constexpr Entry entry = Q::entries[e];
+    if constexpr (entry.row >= entry.column) a[entry.column][entry.row] = q.template value<e>();
+  });
+  S least[n];
+  each<n>([&](int j) { least[j] = rounding_share<S> * a[j][j]; });
+  bool good = true;
+  unrolled<static_cast<std::size_t>(n)>([&](auto column) __attribute__((always_inline)) {
+    constexpr std::size_t j = column;
+    bool alone = true;  // nothing below the diagonal
+    unrolled<static_cast<std::size_t>(n)>([&](auto row) __attribute__((always_inline)) {
+      if constexpr (row > j && filled[row][j]) alone = alone && a[j][row] == S(0);
+    });
+    const bool regular = a[j][j] > least[j];
+    good = good && (regular || (a[j][j] == S(0) && alone));
+    const S inverse = regular ? S(1) / a[j][j] : S(0);
+    unrolled<static_cast<std::size_t>(n)>([&](auto row) __attribute__((always_inline)) {
+      if constexpr (row > j && filled[row][j]) {
+        const S factor = a[j][row] * inverse;
+        unrolled<static_cast<std::size_t>(n)>([&](auto k) __attribute__((always_inline)) {
+          if constexpr (k > j && k <= row && filled[k][j]) a[k][row] -= factor * a[j][k];
+        });
+      }
+    });
+  });
+  return good;
 }
 
 /// A x + b. An empty b of run-time size is zero.

@@ -4,9 +4,9 @@
 /// @file
 /// Q and R from a record, by expectation-maximisation: smooth with the noise known so far, then take for Q
 /// and R the mean squares that the smoothed states explain,
-///   Q = 1/T  sum  e e^T + P(k+1) - F C^T - C F^T + F P(k) F^T,   e = x(k+1) (-) f(x(k)),   C = P(k+1) G(k)^T
+///   Q = 1/T  sum  e e^T + (I - F G(k)) P(k+1) (I - F G(k))^T + F V(k) F^T,   e = x(k+1) (-) f(x(k))
 ///   R = 1/T' sum  r r^T + H P(k) H^T,                            r = z (-) h(x(k))
-/// with the states given the whole record, the smoother's gains G and T' measurements (R. Shumway, D.
+/// with the states given the whole record, G and V of smoother.hpp and T' measurements (R. Shumway, D.
 /// Stoffer, "An approach to time series smoothing and forecasting using the EM algorithm", J. Time Series
 /// Analysis 3, 1982). The likelihood never falls where the models are linear, and converges linearly: tens to
 /// hundreds of rounds. Elsewhere the linearisation makes both approximate.
@@ -94,13 +94,11 @@ struct NoiseSums {
     constexpr int n = dof<X>;
     const CovarianceOf<X> jacobian = dense_of(f.jacobian(before.mean, u, dt));
     const Tangent<X> e = local(X(f.propagate(before.mean, u, dt)), after.mean);
-    const CovarianceOf<X> back = transposed<n, n, S>(jacobian);
-    const CovarianceOf<X> gain = transposed<n, n, S>(smoother_gain(step));
-    const CovarianceOf<X> shared = column_product(column_product(after.covariance, gain), back);
-    const CovarianceOf<X> spread = column_product(jacobian, column_product(before.covariance, back));
-    for (int j = 0; j < static_cast<int>(process.cols()); ++j)
-      for (int i = 0; i < static_cast<int>(process.rows()); ++i)
-        process(i, j) += e(i) * e(j) + after.covariance(i, j) - shared(i, j) - shared(j, i) + spread(i, j);
+    CovarianceOf<X> left = -column_product(jacobian, step.gain);
+    for (int i = 0; i < static_cast<int>(process.rows()); ++i) left(i, i) += S(1);
+    const CovarianceOf<X> of_after = column_product(left, semi_definite_root<n, S>(after.covariance));
+    const CovarianceOf<X> of_before = column_product(jacobian, semi_definite_root<n, S>(step.given_after));
+    process += squared_root<n, S>(of_after) + squared_root<n, S>(of_before) + e * e.transpose();
     ++steps;
   }
   void add_sighting(const H& h, const typename H::Measurement& z, const Gaussian<typename H::State>& belief) {

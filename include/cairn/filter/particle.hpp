@@ -19,6 +19,7 @@
 #include <limits>
 #include <set>
 #include <span>
+#include <string>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -54,6 +55,25 @@ void draw_sorted(std::span<const double> weights, std::size_t count, const Posit
   }
 }
 
+/// The weights divided by their sum.
+inline std::vector<double> shares_of(std::span<const double> weights) {
+  std::vector<double> shares(weights.begin(), weights.end());
+  double sum = 0.0;
+  for (std::size_t i = 0; i < shares.size(); ++i) {
+    if (!(shares[i] >= 0.0) || !(shares[i] <= std::numeric_limits<double>::max())) {
+      std::string text("resampling: expected weights that are finite and not negative; found ");
+      text.append(std::to_string(shares[i])).append(" at index ").append(std::to_string(i));
+      raise(text);
+    }
+    sum += shares[i];
+  }
+  if (!(sum > 0.0) || !(sum <= std::numeric_limits<double>::max()))
+    raise("resampling: expected weights with a finite sum above zero");
+  if (sum != 1.0)
+    for (double& share : shares) share /= sum;
+  return shares;
+}
+
 /// Sorted independent uniforms on [0, 1) by their normalised exponential spacings.
 inline std::vector<double> sorted_uniforms(std::size_t count, Random& random) {
   std::vector<double> u(count);
@@ -66,13 +86,16 @@ inline std::vector<double> sorted_uniforms(std::size_t count, Random& random) {
 
 }  // namespace detail
 
-/// `count` indices drawn in proportion to `weights`, which sum to 1, in rising order. Every scheme draws
-/// index i count * weight_i times on average. O(count + size).
+/// `count` indices drawn in proportion to `weights`, of any sum above zero, in rising order. Every scheme draws
+/// index i count * weight_i times the sum's inverse on average; none where there are no weights. Throws Error
+/// naming a weight that is negative or not finite, or where all are zero. O(count + size).
 [[nodiscard]] inline std::vector<std::size_t> resampled_indices(std::span<const double> weights,
                                                                 std::size_t count, Resampling scheme,
                                                                 Random& random) {
   std::vector<std::size_t> out;
   if (weights.empty()) return out;
+  const std::vector<double> shares = detail::shares_of(weights);
+  weights = shares;
   out.reserve(count);
   const double n = static_cast<double>(count);
   if (scheme == Resampling::systematic) {
@@ -159,7 +182,8 @@ struct Particles {
     return Status::accepted;
   }
 
-  /// Draws `count` particles in proportion to the weights; all are equal afterwards.
+  /// Draws `count` particles in proportion to the weights; all are equal afterwards. Throws Error, and nothing
+  /// is changed, where a weight is not a number or all are zero.
   void resample(std::size_t count, Resampling scheme, Random& random) {
     std::vector<X> next;
     next.reserve(count);
@@ -185,7 +209,10 @@ Status resample_by_kld(Particles<X>& belief, const KldSampling& options, const B
   if (belief.states.empty()) return Status::depleted;
   if (!(options.epsilon > 0.0) || options.most < 1 || options.least > options.most) return Status::bad_option;
   std::vector<double> sums = belief.weights();
+  for (const double weight : sums)
+    if (!(weight <= std::numeric_limits<double>::max())) return Status::not_finite;
   for (std::size_t i = 1; i < sums.size(); ++i) sums[i] += sums[i - 1];
+  if (!(sums.back() <= std::numeric_limits<double>::max())) return Status::not_finite;
   if (!(sums.back() > 0.0)) return Status::depleted;
   std::set<std::decay_t<decltype(bin(belief.states.front()))>> bins;
   std::vector<X> next;

@@ -23,7 +23,11 @@
 /// 1970).
 #pragma once
 
+#include <type_traits>
+
 #include <cairn/core/check.hpp>
+#include <cairn/core/cholesky.hpp>
+#include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/gaussian.hpp>
@@ -35,6 +39,13 @@
 namespace cairn::inline CAIRN_ABI {
 
 namespace detail {
+
+/// R can be weighed: it is positive definite, so that every residual has a size in its units.
+template <int M, class S>
+[[nodiscard]] bool is_regular_noise(const Matrix<M, M, S>& r) {
+  const Cholesky<M, S> root(r);
+  return root.good() && root.least_share() > rounding_share<S>;
+}
 
 /// The sensor with its noise multiplied.
 template <MeasurementModel H>
@@ -54,7 +65,8 @@ struct Robust {
   Filter filter{};
   double limit = 9.0;  ///< NIS above which R is raised; > 0, usually a chi-square quantile
 
-  /// Like filter.update; where R was raised the innovation is that of the raised R.
+  /// Like filter.update; where R was raised the innovation is that of the raised R. not_positive_definite where
+  /// no factor would do, as for R = 0.
   template <MeasurementModel H>
   auto update(Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
     using S = ScalarOf<typename H::State>;
@@ -75,6 +87,11 @@ struct Robust {
     double low = 1.0;
     double high = 2.0;
     while (nis(high) > limit && high < 1e30) high *= 2.0;
+    if (!detail::is_regular_noise<m, S>(r) || !(nis(high) <= limit)) {
+      belief = before;
+      innovation.status = Status::not_positive_definite;
+      return innovation;
+    }
     for (int step = 0; step < 60; ++step) {
       const double middle = 0.5 * (low + high);
       (nis(middle) > limit ? low : high) = middle;
@@ -87,9 +104,9 @@ struct Robust {
 namespace detail {
 
 template <MeasurementModel H>
-[[nodiscard]] auto out_of_range() {
+[[nodiscard]] auto refused_as(Status status) {
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> innovation;
-  innovation.status = Status::bad_option;
+  innovation.status = status;
   return innovation;
 }
 
@@ -110,8 +127,14 @@ auto reweighted_update(const Filter& filter, Gaussian<typename H::State>& belief
   };
   auto innovation = filter.update(belief, sensor, z);
   if (!innovation.accepted()) return innovation;
+  if (const Matrix<m, m, S> r = sensor.noise(before.mean); !is_regular_noise<m, S>(r)) {
+    belief = before;
+    innovation.status = Status::not_positive_definite;
+    return innovation;
+  }
+  constexpr double close = std::is_same_v<S, float> ? 1e-5 : 1e-9;
   double factor = 1.0 / weight(residual_size(belief));
-  for (int step = 0; step < 100; ++step) {
+  for (int step = 0; step < 1000; ++step) {
     Gaussian<typename H::State> next = before;
     const auto found = filter.update(next, Inflated<H>{sensor, factor}, z);
     if (!found.accepted()) {
@@ -123,8 +146,10 @@ auto reweighted_update(const Filter& filter, Gaussian<typename H::State>& belief
     const double wanted = 1.0 / weight(residual_size(next));
     const double change = wanted - factor;
     factor = wanted;
-    if (!((change < 0 ? -change : change) > 1e-9 * wanted)) break;
+    if ((change < 0 ? -change : change) <= close * wanted) return innovation;
   }
+  belief = before;
+  innovation.status = Status::not_converged;
   return innovation;
 }
 
@@ -139,7 +164,7 @@ struct Huber {
   /// Like filter.update; the innovation and the covariance are those of the weighed R.
   template <MeasurementModel H>
   auto update(Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
-    if (!(threshold > 0.0)) return detail::out_of_range<H>();
+    if (!(threshold > 0.0)) return detail::refused_as<H>(Status::bad_option);
     const auto weight = [&](double t) { return t > threshold ? threshold / t : 1.0; };
     return detail::reweighted_update(filter, belief, sensor, z, weight);
   }
@@ -154,7 +179,7 @@ struct StudentT {
   /// Like filter.update; the innovation and the covariance are those of the weighed R.
   template <MeasurementModel H>
   auto update(Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
-    if (!(degrees > 0.0)) return detail::out_of_range<H>();
+    if (!(degrees > 0.0)) return detail::refused_as<H>(Status::bad_option);
     const int m = dof_of(z);
     const auto weight = [&](double t) { return (degrees + m) / (degrees + t * t); };
     return detail::reweighted_update(filter, belief, sensor, z, weight);

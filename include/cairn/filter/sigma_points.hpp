@@ -18,6 +18,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 #include <type_traits>
 
 #include <cairn/core/linalg.hpp>
@@ -106,6 +107,90 @@ template <Manifold X, class F>
   Transformed<Y, dof<X>> out{retract(center, mean), CovarianceOf<Y>::Zero(m, m), cross / c};
   out.covariance = w * squares + static_cast<S>(beta_minus_alpha2) * (mean * mean.transpose());
   return out;
+}
+
+/// The same sums as rows of an array for triangularise(), whose squares they are: odd_i / c for i < n, then
+/// even_i / c, then sqrt(beta - alpha^2) m, so that nothing is lost by squaring. `rows` has 2n + 1 of them.
+/// Where beta < alpha^2 the even rows lose a part of their mean instead, since m is their sum by c:
+///   sum e_i e_i^T - w m m^T = sum f_i f_i^T,   f_i = e_i - (1 - sqrt(1 - s)) sum e_i / n,   s = w n / c^2
+/// for s <= 1; beyond, the last row is NaN where m is not zero. Returns the transformed mean.
+template <Manifold X, class F, class Array>
+[[nodiscard]] auto sigma_rows(const X& x, const CovarianceOf<X>& root, const F& f, double c2,
+                              double beta_minus_alpha2, Array& rows) {
+  using S = ScalarOf<X>;
+  using Y = std::decay_t<decltype(f(x))>;
+  using std::sqrt;
+  const int n = static_cast<int>(root.rows());
+  const S c = spread<S>(c2);
+  const Y center = f(x);
+  Tangent<Y> mean = Tangent<Y>::Zero(dof_of(center));
+  for (int i = 0; i < n; ++i) {
+    Tangent<X> step = c * root.col(i);
+    const Tangent<Y> up = local(center, Y(f(retract(x, step))));
+    step = -step;
+    const Tangent<Y> down = local(center, Y(f(retract(x, step))));
+    Tangent<Y> odd = up, even = down;
+    for (int k = 0; k < static_cast<int>(mean.size()); ++k) {
+      odd(k) = S(0.5) * (up(k) - down(k));
+      even(k) = S(0.5) * (up(k) + down(k));
+    }
+    drop_noise<Y>(center, odd, even);
+    for (int k = 0; k < static_cast<int>(mean.size()); ++k) {
+      rows(i, k) = odd(k) / c;
+      rows(n + i, k) = even(k) / c;
+      mean(k) += even(k) / (c * c);
+    }
+  }
+  const S of_mean = static_cast<S>(beta_minus_alpha2);
+  const S share = of_mean < S(0) ? -of_mean * static_cast<S>(n) / (c * c) : S(0);
+  const bool shared = share > S(0) && share <= S(1) + S(8) * std::numeric_limits<S>::epsilon();
+  for (int k = 0; k < static_cast<int>(mean.size()); ++k) {
+    rows(2 * n, k) = mean(k) == S(0) || shared ? S(0) : sqrt(of_mean) * mean(k);
+    if (!shared) continue;
+    const S rest = share < S(1) ? S(1) - share : S(0);
+    const S part = (S(1) - sqrt(rest)) * c * mean(k) / static_cast<S>(n);
+    for (int i = 0; i < n; ++i) rows(n + i, k) -= part;
+  }
+  return retract(center, mean);
+}
+
+/// digits_left for numbers that came from points: their differences have lost what the numbers themselves are
+/// larger than the standard deviations. `variances` of y as a matrix.
+template <Manifold Y, class Variances>
+[[nodiscard]] inline ScalarOf<Y> largest_ratio(const Y& y, const Variances& variances) {
+  using S = ScalarOf<Y>;
+  S largest(1);
+  if constexpr (is_vector<Y>)
+    for (int i = 0; i < static_cast<int>(y.size()); ++i) {
+      const S squared = y(i) * y(i);
+      if (squared > largest * variances(i, i) && variances(i, i) > S(0)) largest = squared / variances(i, i);
+    }
+  return largest;
+}
+template <Manifold X, Manifold Y, class P, class Q>
+[[nodiscard]] inline ScalarOf<X> digits_of_points(const X& x, const P& p, const Y& y, const Q& q) {
+  using S = ScalarOf<X>;
+  using std::sqrt;
+  const S by_x = largest_ratio(x, p), by_y = largest_ratio(y, q);
+  const S digits = S(8192) * std::numeric_limits<S>::epsilon() * sqrt(by_x > by_y ? by_x : by_y);
+  return digits > digits_left<S> ? digits : digits_left<S>;
+}
+
+/// The mean slope H of a function over the points, m x n: H root is the transpose of the first n rows from
+/// `column` on, the odd ones of sigma_rows(). No slope in a direction without variance. O(n^2 m).
+template <int M, int N, class S, class Array>
+[[nodiscard]] Matrix<M, N, S> mean_slope(const Array& rows, const Matrix<N, N, S>& root, int m,
+                                         int column = 0) {
+  const int n = static_cast<int>(root.rows());
+  Matrix<M, N, S> slope = Matrix<M, N, S>::Zero(m, n);
+  for (int j = 0; j < m; ++j)
+    for (int k = n - 1; k >= 0; --k) {
+      if (!(root(k, k) > S(0))) continue;
+      S sum = rows(k, column + j);
+      for (int i = k + 1; i < n; ++i) sum -= slope(j, i) * root(i, k);
+      slope(j, k) = sum / root(k, k);
+    }
+  return slope;
 }
 
 }  // namespace detail

@@ -5,7 +5,10 @@
 /// The Rauch-Tung-Striebel smoother: what the whole record says about every moment of it.
 ///
 ///   G_k = C_k P(k+1|k)^-1,   C_k = cov(x_k, x_{k+1|k}),  which is P F^T where the process is linear
-///   x(k|T) = x(k|k) (+) G_k (x(k+1|T) (-) x(k+1|k)),   P(k|T) = P(k|k) + G_k (P(k+1|T) - P(k+1|k)) G_k^T
+///   x(k|T) = x(k|k) (+) G_k (x(k+1|T) (-) x(k+1|k)),   P(k|T) = V_k + G_k P(k+1|T) G_k^T
+/// V_k is what would be left of P(k|k) if x(k+1) were known, P(k|k) - G_k P(k+1|k) G_k^T, as a sum of squares:
+/// with P(k|k) = L L^T, F L the image of L by the motion and everything else that P(k+1|k) consists of as W W^T,
+///   V_k = (L - G_k F L)(L - G_k F L)^T + G_k W (G_k W)^T
 /// (H. Rauch, F. Tung, C. Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA Journal 3,
 /// 1965; S. Sarkka, "Unscented Rauch-Tung-Striebel smoother", IEEE Trans. Automatic Control 53, 2008.)
 ///
@@ -19,12 +22,15 @@
 /// ```
 #pragma once
 
+#include <cmath>
 #include <concepts>
 #include <cstddef>
 #include <optional>
 #include <vector>
 
+#include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/array_update.hpp>
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kalman.hpp>
@@ -37,67 +43,122 @@
 
 namespace cairn::inline CAIRN_ABI {
 
-/// One prediction as a smoother needs it: what was known before, what was predicted, and how they vary
-/// together.
+/// One prediction as a smoother needs it: what was known before, what was predicted, and what the state after
+/// says about the state before.
 template <Manifold X>
 struct RecordedStep {
   Gaussian<X> before;
   Gaussian<X> predicted;
-  CovarianceOf<X> cross;  ///< covariance of the state before and the state after
+  CovarianceOf<X> gain;         ///< G: step of the state before by step of the state after
+  CovarianceOf<X> given_after;  ///< V: covariance of the state before if the state after were known
 };
 
 namespace detail {
 
-template <class Filter, class F>
-[[nodiscard]] CovarianceOf<typename F::State> cross_covariance(const Filter& filter,
-                                                               const Gaussian<typename F::State>& belief,
-                                                               const F& process, const typename F::Control& u,
-                                                               double dt) {
-  using X = typename F::State;
-  if constexpr (std::same_as<Filter, Unscented>) {
-    const auto f = [&](const X& x) -> X { return process.propagate(x, u, dt); };
-    const CovarianceOf<X> root = semi_definite_root<dof<X>, ScalarOf<X>>(belief.covariance);
-    const SigmaPoints& points = filter.points;
-    return unscented_transform(belief.mean, root, f, points.spread_squared(static_cast<int>(root.rows())),
-                               points.beta - points.alpha * points.alpha)
-        .cross;
-  } else {
-    const CovarianceOf<X> f = dense_of(process.jacobian(belief.mean, u, dt));
-    return belief.covariance * f.transpose();
+/// How a prediction made its covariance: image^T and rest, rows of an array whose squares they are. The first n
+/// rows are the images of the columns of `root`, the others stand for all that was added.
+template <class X, class Array>
+void record_rows(RecordedStep<X>& step, const CovarianceOf<X>& root, Array& array) {
+  using S = ScalarOf<X>;
+  constexpr int n = dof<X>;
+  const int ns = static_cast<int>(root.rows()), rows = static_cast<int>(array.rows());
+  // [image^T L^T; rest^T 0] -> [U, (G U^T)^T; 0 *],  U^T U = P(k+1|k); a number that others fix has no pivot
+  Array triangular = array;
+  Vector<n, int> pivot = Vector<n, int>::Zero(ns);
+  to_echelon(triangular, ns, pivot);
+  step.gain = CovarianceOf<X>::Zero(ns, ns);
+  for (int j = ns - 1; j >= 0; --j) {
+    const int row = pivot(j);
+    if (row < 0) continue;
+    for (int i = 0; i < ns; ++i) {
+      S sum = triangular(row, ns + i);
+      for (int k = j + 1; k < ns; ++k) sum -= step.gain(i, k) * triangular(row, k);
+      step.gain(i, j) = sum / triangular(row, j);
+    }
   }
+  Matrix<n, Array::RowsAtCompileTime, S> left(ns, rows);
+  for (int k = 0; k < rows; ++k)
+    for (int i = 0; i < ns; ++i) {
+      S sum = array(k, ns + i);
+      for (int j = 0; j < ns; ++j) sum -= step.gain(i, j) * array(k, j);
+      left(i, k) = sum;
+    }
+  step.given_after = CovarianceOf<X>::Zero(ns, ns);
+  for (int j = 0; j < ns; ++j)
+    for (int i = j; i < ns; ++i) {
+      S sum(0);
+      for (int k = 0; k < rows; ++k) sum += left(i, k) * left(j, k);
+      step.given_after(i, j) = step.given_after(j, i) = sum;
+    }
 }
 
-/// cross * predicted^-1. A direction without predicted uncertainty is not corrected.
-template <Manifold X>
-[[nodiscard]] CovarianceOf<X> smoother_gain(const RecordedStep<X>& step) {
-  const int n = static_cast<int>(step.cross.rows());
-  const CovarianceOf<X> lower = semi_definite_root<dof<X>, ScalarOf<X>>(step.predicted.covariance);
-  CovarianceOf<X> gain_t = transposed<dof<X>, dof<X>, ScalarOf<X>>(step.cross);
-  for (int i = 0; i < n; ++i) {
-    for (int k = 0; k < i; ++k) gain_t.row(i) -= lower(i, k) * gain_t.row(k);
-    gain_t.row(i) *= lower(i, i) > 0 ? ScalarOf<X>(1) / lower(i, i) : ScalarOf<X>(0);
+/// The step that led from `before` to `predicted`.
+template <class Filter, class F>
+[[nodiscard]] RecordedStep<typename F::State> record_step(const Filter& filter,
+                                                          const Gaussian<typename F::State>& before,
+                                                          const Gaussian<typename F::State>& predicted,
+                                                          const F& process, const typename F::Control& u,
+                                                          double dt) {
+  using X = typename F::State;
+  using S = ScalarOf<X>;
+  using std::sqrt;
+  constexpr int n = dof<X>;
+  const CovarianceOf<X> root = semi_definite_root<n, S>(before.covariance);
+  const int ns = static_cast<int>(root.rows());
+  RecordedStep<X> step{before, predicted, root, root};
+  CovarianceOf<X> q = process.noise(before.mean, u, dt);
+  double fading = 1.0;
+  if constexpr (requires { filter.fading; }) {
+    fading = filter.fading;
+    for (int i = 0; i < ns; ++i) q(i, i) += static_cast<S>(filter.stabilising_noise);
   }
-  for (int i = n - 1; i >= 0; --i) {
-    for (int k = i + 1; k < n; ++k) gain_t.row(i) -= lower(k, i) * gain_t.row(k);
-    gain_t.row(i) *= lower(i, i) > 0 ? ScalarOf<X>(1) / lower(i, i) : ScalarOf<X>(0);
+  const S faded = sqrt(static_cast<S>(fading)), more = sqrt(static_cast<S>(fading - 1.0));
+  const CovarianceOf<X> root_q = semi_definite_root<n, S>(q);
+  constexpr bool unscented = std::same_as<Filter, Unscented>;
+  constexpr int count = unscented ? 4 : 3;  // blocks of n rows: image, fading, noise and what is bent
+  constexpr int rows = n == dynamic ? dynamic : count * n + 1;
+  Matrix<rows, size_sum<n, n>, S> array = Matrix<rows, size_sum<n, n>, S>::Zero(count * ns + 1, 2 * ns);
+  if constexpr (unscented) {
+    const SigmaPoints& points = filter.points;
+    Matrix<rows, size_sum<n, n>, S> sums = array;
+    const auto f = [&](const X& x) -> X { return process.propagate(x, u, dt); };
+    static_cast<void>(sigma_rows(before.mean, root, f, points.spread_squared(ns),
+                                 points.beta - points.alpha * points.alpha, sums));
+    for (int j = 0; j < ns; ++j) {
+      for (int i = 0; i < ns; ++i) {
+        array(i, j) = sums(i, j);
+        array(3 * ns + i, j) = faded * sums(ns + i, j);
+      }
+      const S last = faded * sums(2 * ns, j);
+      array(4 * ns, j) = finite(last) ? last : S(0);  // a negative square, which no root has
+    }
+  } else {
+    const CovarianceOf<X> jacobian = dense_of(process.jacobian(before.mean, u, dt));
+    put_transposed(array, 0, 0, column_product(jacobian, root));
   }
-  return transposed<dof<X>, dof<X>, ScalarOf<X>>(gain_t);
+  for (int j = 0; j < ns; ++j)
+    for (int i = 0; i < ns; ++i) {
+      array(ns + i, j) = more * array(i, j);
+      array(2 * ns + i, j) = root_q(j, i);
+    }
+  put_transposed(array, 0, ns, root);
+  record_rows(step, root, array);
+  return step;
 }
 
 }  // namespace detail
 
-/// The belief before `step`, corrected by what became known of the state after it.
+/// The belief before `step`, corrected by what became known of the state after it. Its covariance is a sum of
+/// squares, and one however little was left.
 template <Manifold X>
 [[nodiscard]] Gaussian<X> smooth_back(const RecordedStep<X>& step, const Gaussian<X>& after) {
-  const CovarianceOf<X> gain = detail::smoother_gain(step);
+  using S = ScalarOf<X>;
   constexpr int n = dof<X>;
   const Tangent<X> correction =
-      detail::column_product(gain, Tangent<X>(local(step.predicted.mean, after.mean)));
-  const CovarianceOf<X> change = after.covariance - step.predicted.covariance;
-  return {retract(step.before.mean, correction),
-          symmetrised(step.before.covariance +
-                      detail::column_product(
-                          gain, detail::column_product(change, transposed<n, n, ScalarOf<X>>(gain))))};
+      detail::column_product(step.gain, Tangent<X>(local(step.predicted.mean, after.mean)));
+  const CovarianceOf<X> root =
+      detail::column_product(step.gain, detail::semi_definite_root<n, S>(after.covariance));
+  return {retract(step.before.mean, correction), step.given_after + detail::squared_root<n, S>(root)};
 }
 
 /// Runs a filter and remembers what smoothing needs: one RecordedStep a prediction.
@@ -111,7 +172,7 @@ public:
     const Gaussian<X> before = belief_;
     const Status status = filter_.predict(belief_, process, control, dt);
     if (status == Status::accepted)
-      steps_.push_back({before, belief_, detail::cross_covariance(filter_, before, process, control, dt)});
+      steps_.push_back(detail::record_step(filter_, before, belief_, process, control, dt));
     return status;
   }
   template <ProcessModel F>

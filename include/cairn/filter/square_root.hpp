@@ -18,7 +18,10 @@
 #include <limits>
 #include <type_traits>
 
+#include <cairn/core/check.hpp>
+#include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/array_update.hpp>
 #include <cairn/filter/correct.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kernels.hpp>
@@ -36,61 +39,21 @@ struct SquareRootGaussian {
   X mean;
   CovarianceOf<X> root;
 
+  /// Throws Error where the covariance is none.
   [[nodiscard]] static SquareRootGaussian from(const Gaussian<X>& belief) {
-    return {belief.mean, detail::semi_definite_root<dof<X>, ScalarOf<X>>(belief.covariance)};
+    SquareRootGaussian result{belief.mean, belief.covariance};
+    if (!detail::checked_root<dof<X>, ScalarOf<X>>(belief.covariance, result.root))
+      raise("SquareRootGaussian: the covariance is not finite and positive semi-definite");
+    return result;
   }
-  [[nodiscard]] CovarianceOf<X> covariance() const { return root * root.transpose(); }
+  /// Symmetric bit for bit.
+  [[nodiscard]] CovarianceOf<X> covariance() const {
+    return detail::squared_root<dof<X>, ScalarOf<X>>(root);
+  }
   [[nodiscard]] Gaussian<X> gaussian() const { return {mean, covariance()}; }
 };
 
 namespace detail {
-
-/// Householder: makes the C x R matrix `a` upper triangular in its first R rows, a^T a unchanged, diagonal
-/// not negative. C >= R.
-template <int C, int R, class S>
-void triangularise(Matrix<C, R, S>& a) {
-  using std::sqrt;
-  const int rows = static_cast<int>(a.rows());
-  const int columns = static_cast<int>(a.cols());
-  for (int k = 0; k < columns; ++k) {
-    S squared(0);
-    for (int i = k + 1; i < rows; ++i) squared += a(i, k) * a(i, k);
-    const S head = a(k, k);
-    const S norm = sqrt(head * head + squared);
-    if (squared > S(0)) {
-      const S first =
-          head > S(0) ? -squared / (head + norm) : head - norm;  // head - norm without cancellation
-      const S factor = S(2) / (first * first + squared);
-      for (int j = k + 1; j < columns; ++j) {
-        S dot = first * a(k, j);
-        for (int i = k + 1; i < rows; ++i) dot += a(i, k) * a(i, j);
-        dot *= factor;
-        a(k, j) -= dot * first;
-        for (int i = k + 1; i < rows; ++i) a(i, j) -= dot * a(i, k);
-      }
-    } else if (head < S(0)) {
-      for (int j = k + 1; j < columns; ++j) a(k, j) = -a(k, j);
-    }
-    a(k, k) = norm;
-    for (int i = k + 1; i < rows; ++i) a(i, k) = S(0);
-  }
-}
-
-/// The transpose of the upper triangle of `array` that starts at (from, from).
-template <class Root, class Array>
-[[nodiscard]] Root lower_part(const Array& array, int from, int size) {
-  Root root = Root::Zero(size, size);
-  for (int j = 0; j < size; ++j)
-    for (int i = j; i < size; ++i) root(i, j) = array(from + j, from + i);
-  return root;
-}
-
-/// Writes a^T into `array` from (row, column) on.
-template <class Array, class A>
-void put_transposed(Array& array, int row, int column, const A& a) {
-  for (int j = 0; j < static_cast<int>(a.cols()); ++j)
-    for (int i = 0; i < static_cast<int>(a.rows()); ++i) array(row + j, column + i) = a(i, j);
-}
 
 /// Keeps L' = top^T of a triangularised array if it is finite.
 template <Manifold X, class Array>
@@ -102,41 +65,32 @@ Status keep_root(SquareRootGaussian<X>& belief, const X& mean, const Array& arra
   return Status::accepted;
 }
 
-/// The update from a filled array of M + N columns, [S-part; P-part] transposed.
+/// The update from a filled array of M + N columns, [S-part; P-part] transposed, with the noise's root in it.
+/// `good`: that is one.
 template <Manifold X, int M, class Array>
 [[nodiscard]] Innovation<M, ScalarOf<X>> correct_by_array(SquareRootGaussian<X>& belief, Array& array,
                                                           const Vector<M, ScalarOf<X>>& residual,
-                                                          double gate) {
+                                                          const Matrix<M, dof<X>, ScalarOf<X>>& h,
+                                                          const Matrix<M, M, ScalarOf<X>>& r, double gate,
+                                                          bool good,
+                                                          ScalarOf<X> digits = root_digits_left<ScalarOf<X>>) {
   using S = ScalarOf<X>;
   const int m = static_cast<int>(residual.size());
-  const int n = static_cast<int>(belief.root.rows());
-  const bool finite_array = all_finite(array);
-  triangularise(array);
-  const Matrix<M, M, S> root_s = lower_part<Matrix<M, M, S>>(array, 0, m);
-  Innovation<M, S> in = fresh_innovation<M, S>(residual, root_s * root_s.transpose());
-  Vector<M, S> y = residual;
-  bool regular = true;
-  for (int i = 0; i < m; ++i) {
-    for (int k = 0; k < i; ++k) y(i) -= root_s(i, k) * y(k);
-    regular = regular && root_s(i, i) > S(0);
-    y(i) /= root_s(i, i);
-  }
-  in.nis = y.dot(y);
-  const CovarianceOf<X> root = lower_part<CovarianceOf<X>>(array, m, n);
-  Tangent<X> step = Tangent<X>::Zero(n);
-  for (int i = 0; i < n; ++i)
-    for (int k = 0; k < m; ++k) step(i) += array(k, m + i) * y(k);
+  auto in = fresh_innovation<M, S>(residual, Matrix<M, M, S>::Zero(m, m));
+  const bool finite_numbers = all_finite(array) && all_finite(residual) && finite_state(belief.mean);
   if (!(gate > 0.0))
     in.status = Status::bad_option;
-  else if (!finite_array || !all_finite(residual) || !finite_state(belief.mean))
-    in.status = Status::not_finite;
-  else if (!regular || !all_finite(root) || !all_finite(step))
-    in.status = Status::not_positive_definite;
-  else if (!(in.nis <= static_cast<S>(gate)))
-    in.status = Status::gated;
+  else if (!finite_numbers || !good)
+    in.status = finite_numbers ? Status::not_positive_definite : Status::not_finite;
   if (in.status != Status::accepted) return in;
-  belief.mean = retract(belief.mean, step);
-  belief.root = root;
+  const auto update =
+      update_by_array<dof<X>, M, S>(array, residual, static_cast<int>(belief.root.rows()));
+  in.status = judge_array(update, in, gate);
+  if (in.status == Status::accepted && !determined<dof<X>, M, S>(update, belief.root, h, r, KeptAs::root, digits))
+    in.status = Status::not_positive_definite;
+  if (in.status != Status::accepted) return in;
+  belief.mean = retract(belief.mean, Tangent<X>(update.step));
+  belief.root = update.root;
   return in;
 }
 
@@ -197,11 +151,13 @@ struct SquareRoot {
     }
     Matrix<detail::size_sum<m, n>, detail::size_sum<m, n>, S> array(ms + ns, ms + ns);
     array.setZero();
-    detail::put_transposed(array, 0, 0, detail::semi_definite_root<m, S>(r));
+    Matrix<m, m, S> root_r = r;
+    const bool good = detail::checked_root<m, S>(r, root_r);
+    detail::put_transposed(array, 0, 0, root_r);
     detail::put_transposed(array, ms, 0, detail::column_product(h, belief.root));
     detail::put_transposed(array, ms, ms, belief.root);
     if (!all_finite(r)) array(0, 0) = std::numeric_limits<S>::quiet_NaN();
-    return detail::correct_by_array<X, m>(belief, array, residual, gate);
+    return detail::correct_by_array<X, m>(belief, array, residual, h, r, gate, good);
   }
 };
 
@@ -258,15 +214,24 @@ struct SquareRootUnscented {
     constexpr int rows = n == dynamic || m == dynamic ? dynamic : 2 * n + 1 + m;
     Matrix<rows, detail::size_sum<m, n>, S> array(2 * ns + 1 + ms, ms + ns);
     array.setZero();
-    Matrix<n == dynamic ? dynamic : 2 * n + 1, m, S> seen(2 * ns + 1, ms);
     const auto h = [&](const X& x) -> Z { return sensor.predict(x); };
-    const Z mean = spread(belief, h, seen);
-    for (int j = 0; j < ms; ++j)
-      for (int i = 0; i <= 2 * ns; ++i) array(i, j) = seen(i, j);
+    const Z mean = spread(belief, h, array);
+    Matrix<m, m, S> root_r = r;
+    const bool good = detail::checked_root<m, S>(r, root_r);
     detail::put_transposed(array, 0, ms, belief.root);
-    detail::put_transposed(array, 2 * ns + 1, 0, detail::semi_definite_root<m, S>(r));
+    detail::put_transposed(array, 2 * ns + 1, 0, root_r);
     if (!all_finite(r)) array(0, 0) = std::numeric_limits<S>::quiet_NaN();
-    return detail::correct_by_array<X, m>(belief, array, local(mean, z), sound(ns) ? gate : 0.0);
+    const Matrix<m, n, S> slope = detail::mean_slope<m, n, S>(array, belief.root, ms);
+    Vector<detail::size_sum<m, n>, S> variances(ms + ns);
+    for (int j = 0; j < ms + ns; ++j) {
+      variances(j) = S(0);
+      for (int i = 0; i < static_cast<int>(array.rows()); ++i) variances(j) += array(i, j) * array(i, j);
+    }
+    const S digits = detail::digits_of_points(
+        belief.mean, [&](int i, int) { return variances(ms + i); }, mean,
+        [&](int i, int) { return variances(i); });
+    return detail::correct_by_array<X, m>(belief, array, local(mean, z), slope, r, sound(ns) ? gate : 0.0, good,
+                                          digits);
   }
 
 private:
@@ -274,38 +239,11 @@ private:
     return points.spread_squared(n) > 0.0 && points.beta >= points.alpha * points.alpha;
   }
 
-  /// Rows: odd_i / c for i < n, even_i / c, sqrt(beta - alpha^2) m. Returns the transformed mean.
   template <Manifold X, class F, class Array>
   auto spread(const SquareRootGaussian<X>& belief, const F& f, Array& rows) const {
-    using S = ScalarOf<X>;
-    using Y = std::decay_t<decltype(f(belief.mean))>;
-    using std::sqrt;
-    const int n = static_cast<int>(belief.root.rows());
-    const S wanted = sqrt(static_cast<S>(points.spread_squared(n)));
-    const S nearest = sqrt(sqrt(std::numeric_limits<S>::epsilon()));
-    const S c = wanted > nearest ? wanted : nearest;
-    const Y center = f(belief.mean);
-    Tangent<Y> mean = Tangent<Y>::Zero(dof_of(center));
-    for (int i = 0; i < n; ++i) {
-      Tangent<X> step = c * belief.root.col(i);
-      const Tangent<Y> up = local(center, Y(f(retract(belief.mean, step))));
-      step = -step;
-      const Tangent<Y> down = local(center, Y(f(retract(belief.mean, step))));
-      Tangent<Y> odd = up, even = down;
-      for (int k = 0; k < static_cast<int>(mean.size()); ++k) {
-        odd(k) = S(0.5) * (up(k) - down(k));
-        even(k) = S(0.5) * (up(k) + down(k));
-      }
-      detail::drop_noise<Y>(center, odd, even);
-      for (int k = 0; k < static_cast<int>(mean.size()); ++k) {
-        rows(i, k) = odd(k) / c;
-        rows(n + i, k) = even(k) / c;
-        mean(k) += even(k) / (c * c);
-      }
-    }
-    const S of_mean = sqrt(static_cast<S>(points.beta - points.alpha * points.alpha));
-    for (int k = 0; k < static_cast<int>(mean.size()); ++k) rows(2 * n, k) = of_mean * mean(k);
-    return retract(center, mean);
+    return detail::sigma_rows(belief.mean, belief.root, f,
+                              points.spread_squared(static_cast<int>(belief.root.rows())),
+                              points.beta - points.alpha * points.alpha, rows);
   }
 };
 

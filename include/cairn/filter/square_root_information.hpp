@@ -13,6 +13,7 @@
 /// 1977, chapters V and VI.) e^2 is what the measurement adds to the sum of squared residuals.
 #pragma once
 
+#include <cmath>
 #include <concepts>
 #include <limits>
 #include <optional>
@@ -22,26 +23,11 @@
 #include <cairn/filter/information.hpp>
 #include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/square_root.hpp>
+#include <cairn/filter/correct.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn::inline CAIRN_ABI {
-
-namespace detail {
-
-/// Solves the upper triangular root d = b in place; false where a diagonal entry is zero.
-template <int N, int C, class S>
-[[nodiscard]] bool solve_upper(const Matrix<N, N, S>& root, Matrix<N, C, S>& b) {
-  for (int i = static_cast<int>(root.rows()) - 1; i >= 0; --i) {
-    if (!(root(i, i) > S(0))) return false;
-    for (int k = i + 1; k < static_cast<int>(root.rows()); ++k) b.row(i) -= root(i, k) * b.row(k);
-    b.row(i) /= root(i, i);
-  }
-  return true;
-}
-
-}  // namespace detail
 
 /// Truth = retract(point, d); the density of d is exp(-|R d - b|^2 / 2), R upper triangular and possibly
 /// singular.
@@ -57,31 +43,48 @@ struct SquareRootInformation {
     const int n = dof_of(x);
     return {x, CovarianceOf<X>::Zero(n, n), Tangent<X>::Zero(n)};
   }
-  /// The same belief; nothing where the covariance is singular.
+  /// The same belief; nothing where the covariance is singular, or so nearly that its inverse would not have
+  /// three digits.
   [[nodiscard]] static std::optional<SquareRootInformation> from(const Gaussian<X>& belief) {
     using S = ScalarOf<X>;
     const int n = dof_of(belief.mean);
-    const CovarianceOf<X> lower = detail::semi_definite_root<dof<X>, S>(belief.covariance);
-    CovarianceOf<X> inverse = CovarianceOf<X>::Identity(n, n);  // L^-1, whose square is Y
+    CovarianceOf<X> lower = belief.covariance, inverse = lower;
+    if (!detail::regular_root<dof<X>, S>(belief.covariance, lower)) return std::nullopt;
+    const CovarianceOf<X> upper = transposed<dof<X>, dof<X>, S>(lower);
+    if (!detail::invert_upper<dof<X>, S>(upper, inverse)) return std::nullopt;
+    CovarianceOf<X> root = transposed<dof<X>, dof<X>, S>(inverse);  // L^-1, whose square is Y
     for (int i = 0; i < n; ++i) {
-      if (!(lower(i, i) > S(0))) return std::nullopt;
-      for (int k = 0; k < i; ++k) inverse.row(i) -= lower(i, k) * inverse.row(k);
-      inverse.row(i) /= lower(i, i);
+      S information(0);
+      for (int k = 0; k < n; ++k) information += root(k, i) * root(k, i);
+      if (!(detail::digits_left<S> * information * belief.covariance(i, i) < S(1))) return std::nullopt;
     }
-    detail::triangularise(inverse);
-    return SquareRootInformation{belief.mean, inverse, Tangent<X>::Zero(n)};
+    detail::triangularise(root);
+    return SquareRootInformation{belief.mean, root, Tangent<X>::Zero(n)};
   }
   /// Mean and covariance; nothing while some direction has no information.
   [[nodiscard]] std::optional<Gaussian<X>> gaussian() const {
-    const int n = static_cast<int>(vector.size());
-    CovarianceOf<X> inverse = CovarianceOf<X>::Identity(n, n);
+    CovarianceOf<X> inverse = root;
     Tangent<X> d = vector;
-    if (!detail::solve_upper<dof<X>, dof<X>, ScalarOf<X>>(root, inverse) ||
-        !detail::solve_upper<dof<X>, 1, ScalarOf<X>>(root, d))
-      return std::nullopt;
-    Gaussian<X> result{retract(point, d), symmetrised(inverse * inverse.transpose())};
+    if (!solve(inverse, d)) return std::nullopt;
+    Gaussian<X> result{retract(point, d), detail::squared_root<dof<X>, ScalarOf<X>>(inverse)};
     if (!all_finite(result.covariance) || !detail::finite_state(result.mean)) return std::nullopt;
     return result;
+  }
+
+  /// R^-1 and the step to the mean; false where that would not have three digits of its standard deviations.
+  [[nodiscard]] bool solve(CovarianceOf<X>& inverse, Tangent<X>& step) const {
+    using S = ScalarOf<X>;
+    using std::abs;
+    using std::sqrt;
+    if (!detail::invert_upper<dof<X>, S>(root, inverse)) return false;
+    step = detail::column_product(inverse, vector);
+    S size(0);  // of the step, in the deviations that each number has given the others
+    for (int i = 0; i < static_cast<int>(step.size()); ++i) {
+      S squares(0);
+      for (int k = 0; k <= i; ++k) squares += root(k, i) * root(k, i);
+      size += sqrt(squares) * abs(step(i));
+    }
+    return size * detail::digits_left<S> <= S(1);
   }
 };
 
@@ -97,7 +100,6 @@ struct SquareRootInformationFilter {
                  const typename F::Control& control, double dt) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
-    using std::sqrt;
     constexpr int n = dof<X>;
     if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
     SquareRootInformation<X> next = belief;
@@ -109,27 +111,8 @@ struct SquareRootInformationFilter {
     if (!all_finite(f)) return Status::not_finite;
     const Status status = detail::stabilise<X>(q, fading, stabilising_noise);
     if (status != Status::accepted) return status;
-    const S faded = sqrt(static_cast<S>(fading));
-    f *= faded;
-    CovarianceOf<X> moved = transposed<n, n, S>(next.root);  // (R F^-1)^T solves F^T y = R^T
-    if (!detail::solve_square<n, n, S>(transposed<n, n, S>(f), moved)) return Status::not_positive_definite;
-    constexpr int width = n == dynamic ? dynamic : 2 * n + 1;
-    Matrix<width, width, S> array = Matrix<width, width, S>::Zero(2 * size + 1, 2 * size + 1);
-    const CovarianceOf<X> moved_root = transposed<n, n, S>(moved);
-    const CovarianceOf<X> of_noise = detail::column_product(moved_root, detail::semi_definite_root<n, S>(q));
-    for (int j = 0; j < size; ++j) {  // one by one: gcc 12 warns wrongly of a block's end
-      array(j, j) = S(1);
-      array(size + j, 2 * size) = next.vector(j) / faded;
-      for (int i = 0; i < size; ++i) {
-        array(size + i, j) = -of_noise(i, j);
-        array(size + i, size + j) = moved_root(i, j);
-      }
-    }
-    detail::triangularise(array);
-    for (int j = 0; j < size; ++j) {
-      next.vector(j) = array(size + j, 2 * size);
-      for (int i = 0; i < size; ++i) next.root(i, j) = array(size + i, size + j);
-    }
+    const Status moved = detail::predict_root<n, S>(next.root, next.vector, f, q, fading);
+    if (moved != Status::accepted) return moved;
     next.point = process.propagate(next.point, control, dt);
     return keep(belief, next);
   }
@@ -161,9 +144,11 @@ struct SquareRootInformationFilter {
       for (int j = 0; j < ns; ++j) array(i, j) = belief.root(i, j);
       array(i, ns) = belief.vector(i);
     }
-    const Matrix<m, m, S> lower = detail::semi_definite_root<m, S>(v);
+    Matrix<m, m, S> lower = v;
+    if (!detail::regular_root<m, S>(v, lower)) return Status::not_positive_definite;
     for (int i = 0; i < ms; ++i) {  // V^-1/2 times (H, residual), row by row
-      if (!(lower(i, i) > S(0))) return Status::not_positive_definite;
+      if (!(lower(i, i) * lower(i, i) > detail::digits_left<S> * v(i, i)))
+        return Status::not_positive_definite;
       for (int j = 0; j <= ns; ++j) {
         S entry = j < ns ? h(i, j) : residual(i);
         for (int k = 0; k < i; ++k) entry -= lower(i, k) * array(ns + k, j);
@@ -182,8 +167,9 @@ struct SquareRootInformationFilter {
   /// Moves the point of linearisation to the mean; false, and nothing changed, while that is unknown.
   template <Manifold X>
   static bool recentre(SquareRootInformation<X>& belief) {
+    CovarianceOf<X> inverse = belief.root;
     Tangent<X> d = belief.vector;
-    if (!detail::solve_upper<dof<X>, 1, ScalarOf<X>>(belief.root, d) || !all_finite(d)) return false;
+    if (!belief.solve(inverse, d) || !all_finite(d)) return false;
     belief.point = retract(belief.point, d);
     belief.vector.setZero();
     return true;

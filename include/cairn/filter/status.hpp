@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 
 #include <Eigen/Core>
 
@@ -29,6 +30,8 @@ enum class [[nodiscard]] Status {
   depleted,               ///< no particle, or no weight, or no mode is left
   not_converged,          ///< an iteration stopped before its tolerance
   too_old,                ///< the measurement is of a moment before all that is remembered
+  bad_weights,            ///< weights or probabilities are negative, or do not sum to 1
+  contradiction,          ///< constraints disagree with each other, or with what is known exactly
 };
 
 /// The status as a sentence for a log.
@@ -54,6 +57,10 @@ enum class [[nodiscard]] Status {
       return "refused: the iteration did not converge";
     case Status::too_old:
       return "refused: the measurement is older than what is remembered";
+    case Status::bad_weights:
+      return "refused: probabilities are negative or do not sum to 1";
+    case Status::contradiction:
+      return "refused: constraints contradict each other or what is known exactly";
   }
   return "unknown status";
 }
@@ -67,6 +74,8 @@ struct [[nodiscard]] Innovation {
   Matrix<M, M, S> covariance{};
   S nis = S(0);
   Status status = Status::accepted;
+  /// Of S, where S as it is written has lost it to rounding; NaN where it has not.
+  S log_determinant = std::numeric_limits<S>::quiet_NaN();
 
   [[nodiscard]] bool accepted() const noexcept { return status == Status::accepted; }
 
@@ -75,7 +84,8 @@ struct [[nodiscard]] Innovation {
   [[nodiscard]] S log_likelihood() const {
     const S two_pi = S(6.283185307179586476925286766559L);
     using std::log;
-    return S(-0.5) * (nis + Cholesky<M, S>(covariance).log_determinant() +
+    const bool lost = log_determinant == log_determinant;
+    return S(-0.5) * (nis + (lost ? log_determinant : Cholesky<M, S>(covariance).log_determinant()) +
                       S(static_cast<int>(residual.size())) * log(two_pi));
   }
 };

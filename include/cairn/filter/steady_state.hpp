@@ -6,63 +6,141 @@
 ///
 /// The predicted covariance solves the discrete algebraic Riccati equation
 ///   P = F P F^T - F P H^T (H P H^T + R)^-1 H P F^T + Q,
-/// here by doubling: each round squares the number of steps taken (B. Anderson, J. Moore, "Optimal
-/// Filtering", 1979, 6.7), so some ten rounds replace a thousand.
+/// here by the doubling that keeps its structure: with A = F^T, G = H^T R^-1 H and P = Q at first,
+///   A <- A W A,   G <- G + A W G A^T,   P <- P + A^T P W A,   W = (I + G P)^-1 of the old ones,
+/// so that each round squares the number of steps taken and A, the closed loop's transition over all of them,
+/// falls to nothing (E. Chu, H. Fan, W. Lin, C. Wang, "Structure-preserving algorithms for periodic
+/// discrete-time algebraic Riccati equations", Int. J. Control 77, 2004). States are taken in units of their
+/// own deviations, so that a small one settles as far as a large one does.
 #pragma once
 
+#include <cmath>
 #include <limits>
-#include <optional>
 
 #include <cairn/core/cholesky.hpp>
+#include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/array_update.hpp>
+#include <cairn/filter/correct.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/information.hpp>
+#include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn::inline CAIRN_ABI {
 
-/// What a Kalman filter settles to.
+/// What a Kalman filter settles to. Where it is not accepted the matrices are of no use.
 template <int N, int M, class S = double>
-struct SteadyState {
+struct [[nodiscard]] SteadyState {
   Matrix<N, N, S> predicted;  ///< covariance before an update
   Matrix<N, N, S> updated;    ///< covariance after it
   Matrix<N, M, S> gain;       ///< x <- x + gain (z - H x)
+  Status status = Status::accepted;
+
+  [[nodiscard]] bool accepted() const noexcept { return status == Status::accepted; }
 };
 
-/// Steady state of x' = F x + noise(Q), z = H x + noise(R); nothing where there is none (a state that grows
-/// and is not seen) or a matrix is not finite or R is not positive definite.
-template <int N, int M, class S>
-[[nodiscard]] std::optional<SteadyState<N, M, S>> steady_state(const Matrix<N, N, S>& f,
-                                                               const Matrix<M, N, S>& h,
-                                                               const Matrix<N, N, S>& q,
-                                                               const Matrix<M, M, S>& r) {
-  const int n = static_cast<int>(f.rows());
-  const Cholesky<M, S> root_r(r);
-  if (!root_r.good()) return std::nullopt;
-  const Matrix<N, N, S> identity = Matrix<N, N, S>::Identity(n, n);
-  Matrix<N, N, S> a = transposed<N, N, S>(f);           // transition of the adjoint, 2^k steps
-  Matrix<N, N, S> g = h.transpose() * root_r.solve(h);  // information of 2^k measurements
-  Matrix<N, N, S> p = q;                                // covariance after 2^k steps from certainty
-  bool settled = false;
-  for (int round = 0; round < 60 && !settled; ++round) {
-    Matrix<N, N, S> inverse_a = a;
-    Matrix<N, N, S> inverse_g = g;
-    const Matrix<N, N, S> w = identity + g * p;
-    if (!detail::solve_square<N, N, S>(w, inverse_a) || !detail::solve_square<N, N, S>(w, inverse_g))
-      return std::nullopt;
-    const Matrix<N, N, S> growth = symmetrised(a.transpose() * p * inverse_a);
-    g = symmetrised(g + a * inverse_g * a.transpose());
-    a = (a * inverse_a).eval();
+namespace detail {
+
+/// Rounds of doubling until every variance has settled and the closed loop has forgotten its start.
+template <int N, class S>
+[[nodiscard]] Status riccati_by_doubling(Matrix<N, N, S> a, Matrix<N, N, S> g, Matrix<N, N, S>& p) {
+  using std::abs;
+  constexpr S epsilon = std::numeric_limits<S>::epsilon();
+  const int n = static_cast<int>(a.rows());
+  for (int round = 0; round < 64; ++round) {
+    Matrix<N, N, S> w = column_product(g, p), inverse_a = a, inverse_g = g;
+    for (int i = 0; i < n; ++i) w(i, i) += S(1);
+    if (!solve_square<N, N, S>(w, inverse_a) || !solve_square<N, N, S>(w, inverse_g))
+      return Status::not_converged;
+    const Matrix<N, N, S> at = transposed<N, N, S>(a);
+    const Matrix<N, N, S> growth = symmetrised(column_product(at, column_product(p, inverse_a)));
+    g = symmetrised(g + column_product(a, column_product(inverse_g, at)));
+    a = column_product(a, inverse_a);
+    bool settled = true;
+    for (int i = 0; i < n; ++i) {
+      settled = settled && growth(i, i) <= S(4) * epsilon * p(i, i);
+      for (int j = 0; j < n; ++j) settled = settled && abs(a(i, j)) <= epsilon;
+    }
     p += growth;
-    if (!all_finite(p) || !all_finite(g)) return std::nullopt;
-    settled =
-        growth.cwiseAbs().maxCoeff() <= S(4) * std::numeric_limits<S>::epsilon() * p.cwiseAbs().maxCoeff();
+    if (!all_finite(p) || !all_finite(g) || !all_finite(a)) return Status::not_converged;
+    if (settled) return Status::accepted;
   }
-  if (!settled) return std::nullopt;
-  const Matrix<N, M, S> ph = p * h.transpose();
-  const Cholesky<M, S> root_s(symmetrised(h * ph + r));
-  SteadyState<N, M, S> result{p, p, root_s.solve(Matrix<M, N, S>(ph.transpose())).transpose()};
-  result.updated = symmetrised(p - result.gain * ph.transpose());
+  return Status::not_converged;
+}
+
+}  // namespace detail
+
+/// Steady state of x' = F x + noise(Q), z = H x + noise(R). Refused: not_converged, where no filter settles (a
+/// state that does not decay and is not seen, or is not driven) or the equation is not solved to half of the
+/// digits; not_positive_definite, where R is not, or Q is no covariance.
+template <int N, int M, class S>
+[[nodiscard]] SteadyState<N, M, S> steady_state(const Matrix<N, N, S>& f, const Matrix<M, N, S>& h,
+                                                const Matrix<N, N, S>& q, const Matrix<M, M, S>& r) {
+  using std::abs;
+  using std::sqrt;
+  const int n = static_cast<int>(f.rows()), m = static_cast<int>(h.rows());
+  SteadyState<N, M, S> result{q, q, Matrix<N, M, S>::Zero(n, m)};
+  const auto refused = [&](Status status) {
+    result.status = status;
+    return result;
+  };
+  if (f.cols() != n || h.cols() != n || q.rows() != n || q.cols() != n || r.rows() != m || r.cols() != m)
+    return refused(Status::size_mismatch);
+  if (!all_finite(f) || !all_finite(h) || !all_finite(r)) return refused(Status::not_finite);
+  const Status noise = detail::judge_noise<N, S>(q);
+  if (noise != Status::accepted) return refused(noise);
+  const Cholesky<M, S> root_r(r);
+  if (!root_r.good()) return refused(Status::not_positive_definite);
+  Vector<N, S> unit = Vector<N, S>::Ones(n);  // powers of two
+  Matrix<N, N, S> a = transposed<N, N, S>(f), g = a, p = q;
+  Status status = Status::accepted;
+  for (int attempt = 0; attempt < 8; ++attempt) {
+    Matrix<M, N, S> scaled_h = h;
+    for (int j = 0; j < n; ++j) {
+      for (int i = 0; i < n; ++i) {
+        a(j, i) = f(i, j) / unit(i) * unit(j);
+        p(i, j) = q(i, j) / unit(i) / unit(j);
+      }
+      for (int i = 0; i < m; ++i) scaled_h(i, j) = h(i, j) * unit(j);
+    }
+    const Matrix<M, N, S> white = root_r.whiten(scaled_h);
+    g.setZero();
+    add_transposed_product(g, white, white);
+    status = detail::riccati_by_doubling<N, S>(a, g, p);
+    if (status != Status::accepted) break;
+    bool balanced = true;
+    for (int i = 0; i < n; ++i)
+      for (S variance = p(i, i); variance > S(4) || (variance < S(0.25) && variance > S(0));) {
+        const S factor = variance > S(4) ? S(2) : S(0.5);
+        unit(i) *= factor;
+        variance /= factor * factor;
+        balanced = false;
+      }
+    if (balanced) break;
+  }
+  if (status != Status::accepted) return refused(status);
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) result.predicted(i, j) = p(i, j) * unit(i) * unit(j);
+  detail::ArrayUpdate<N, M, S> update;
+  status = detail::update_by_roots<N, M, S>(result.predicted, h, r, Vector<M, S>::Zero(m), update);
+  if (status != Status::accepted) return refused(status);
+  result.updated = detail::squared_root<N, S>(update.root);
+  for (int i = 0; i < n; ++i)  // K = white root_s^-1
+    for (int j = m - 1; j >= 0; --j) {
+      S sum = update.white(i, j);
+      for (int k = j + 1; k < m; ++k) sum -= result.gain(i, k) * update.root_s(k, j);
+      result.gain(i, j) = sum / update.root_s(j, j);
+    }
+  const Matrix<N, N, S> next =
+      symmetrised(detail::column_product(f, detail::column_product(result.updated, transposed<N, N, S>(f))) + q);
+  const S tolerance = sqrt(std::numeric_limits<S>::epsilon());
+  for (int i = 0; i < n; ++i)
+    for (int j = 0; j <= i; ++j) {
+      const S size = sqrt(result.predicted(i, i)) * sqrt(result.predicted(j, j));
+      if (!(abs(next(i, j) - result.predicted(i, j)) <= tolerance * size))
+        return refused(Status::not_converged);
+    }
   return result;
 }
 

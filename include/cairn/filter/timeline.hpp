@@ -110,7 +110,8 @@ private:
 
   [[nodiscard]] Status accepts(double time) const {
     if (!(time - time == 0.0)) return Status::bad_time_step;
-    return time < base_.time ? Status::too_old : Status::accepted;
+    const bool known = time >= base_.time && time >= this->time() - horizon_;
+    return known ? Status::accepted : Status::too_old;
   }
   /// Index of the first event after `time`.
   [[nodiscard]] std::size_t place(double time) const {

@@ -119,8 +119,10 @@ struct UDFilter {
     bool correlated = false;
     for (int b = 0; b < m; ++b)
       for (int a = b + 1; a < m; ++a) correlated = correlated || r(a, b) != S(0);
-    const bool regular = correlated ? take_correlated(in, detail::dense_of(jacobian), r, u, d, step)
-                                    : take(in, jacobian, in.residual, r, u, d, step);
+    bool regular = !correlated && take(in, jacobian, in.residual, r, u, d, step);
+    if (correlated && in.status == Status::accepted)
+      in.status = take_correlated(in, detail::dense_of(jacobian), r, belief, u, d, step);
+    regular = regular || correlated;
     if (in.status == Status::accepted) in.status = verdict(in, regular, belief, u, d, step);
     if (in.status == Status::accepted) [[likely]] {
       Tangent<X> moved;
@@ -171,25 +173,37 @@ private:
     return regular;
   }
 
-  /// Correlated noise: R = U_r D_r U_r^T, and U_r^-1 makes the numbers independent, last one first.
-  template <int N, int M, class S>
-  [[gnu::noinline]] static bool take_correlated(Innovation<M, S>& in, Matrix<M, N, S> h,
-                                                const Matrix<M, M, S>& r, Columns<N, S>& u,
-                                                detail::Column<N, S>& d, detail::Column<N, S>& step) {
-    Matrix<M, M, S> upper_r, diagonal_r = Matrix<M, M, S>::Zero();
-    Vector<M, S> d_r = Vector<M, S>::Zero();
-    Vector<M, S> left = in.residual;
-    if (!detail::ud_factor<M, S>(r, upper_r, d_r)) {
-      in.status = all_finite(r) ? Status::not_positive_definite : Status::not_finite;
-      return false;
-    }
-    for (int j = M - 1; j >= 0; --j)
-      for (int k = j + 1; k < M; ++k) {
-        h.row(j) -= upper_r(j, k) * h.row(k);
-        left(j) -= upper_r(j, k) * left(k);
-      }
-    for (int j = 0; j < M; ++j) diagonal_r(j, j) = d_r(j);
-    return take(in, h, left, diagonal_r, u, d, step);
+  /// Correlated noise, by the array of array_update.hpp: to make its numbers independent first would multiply
+  /// the precise ones into the others.
+  template <Manifold X, int N, int M, class S>
+  [[gnu::noinline]] static Status take_correlated(Innovation<M, S>& in, const Matrix<M, N, S>& h,
+                                                  const Matrix<M, M, S>& r, const UDGaussian<X>& belief,
+                                                  Columns<N, S>& u, detail::Column<N, S>& d,
+                                                  detail::Column<N, S>& step) {
+    using std::sqrt;
+    Matrix<M, M, S> root_r = r;
+    if (!all_finite(r) || !all_finite(h) || !all_finite(in.residual)) return Status::not_finite;
+    if (!detail::checked_root<M, S>(r, root_r)) return Status::not_positive_definite;
+    Matrix<N, N, S> root = belief.upper;
+    for (int j = 0; j < N; ++j)
+      for (int i = 0; i < N; ++i) root(i, j) *= sqrt(belief.diagonal(j));
+    Matrix<M + N, M + N, S> array = Matrix<M + N, M + N, S>::Zero();
+    detail::put_transposed(array, 0, 0, root_r);
+    detail::put_transposed(array, M, 0, detail::column_product(h, root));
+    detail::put_transposed(array, M, M, root);
+    const auto update = detail::update_by_array<N, M, S>(array, in.residual, N);
+    constexpr double no_gate = std::numeric_limits<double>::infinity();
+    const Status status = detail::judge_array(update, in, no_gate);
+    if (status != Status::accepted) return status;
+    if (!detail::determined<N, M, S>(update, root, h, r, detail::KeptAs::root))
+      return Status::not_positive_definite;
+    Matrix<N, N, S> upper;
+    Vector<N, S> diagonal;
+    detail::ud_of_root<N, S>(update.root, upper, diagonal);
+    detail::load_columns(upper, u);
+    d.load(diagonal.data());
+    step.load(update.step.data());
+    return Status::accepted;
   }
 
   /// The process noise as weighted columns N to 2N: U_q and D_q.
@@ -206,7 +220,7 @@ private:
       });
       if (good) [[likely]]
         return Status::accepted;
-      return all_finite(q.dense()) ? Status::not_positive_definite : Status::not_finite;
+      return factor_dense<N, S>(q.dense(), w, weights);
     } else if constexpr (detail::is_diagonal<Q>) {
       bool finite = true, positive = true;
       detail::each<N>([&](int j) {
@@ -220,17 +234,20 @@ private:
       if (!finite) return Status::not_finite;
       return positive ? Status::accepted : Status::not_positive_definite;
     } else {
-      const Matrix<N, N, S> dense = detail::dense_of(q);
-      Matrix<N, N, S> upper;
-      Vector<N, S> diagonal = Vector<N, S>::Zero();
-      if (!detail::ud_factor<N, S>(dense, upper, diagonal))
-        return all_finite(dense) ? Status::not_positive_definite : Status::not_finite;
-      detail::each<N>([&](int j) {
-        w[N + j].load(upper.data() + j * N);
-        weights[N + j] = diagonal(j);
-      });
-      return Status::accepted;
+      return factor_dense<N, S>(detail::dense_of(q), w, weights);
     }
+  }
+  template <int N, class S>
+  static Status factor_dense(const Matrix<N, N, S>& q, detail::Column<N, S> (&w)[2 * N], S (&weights)[2 * N]) {
+    Matrix<N, N, S> upper;
+    Vector<N, S> diagonal = Vector<N, S>::Zero();
+    if (!detail::ud_factor<N, S>(q, upper, diagonal))
+      return all_finite(q) ? Status::not_positive_definite : Status::not_finite;
+    detail::each<N>([&](int j) {
+      w[N + j].load(upper.data() + j * N);
+      weights[N + j] = diagonal(j);
+    });
+    return Status::accepted;
   }
 
   template <int N, class S>

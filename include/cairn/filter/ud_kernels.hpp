@@ -12,6 +12,7 @@
 #include <cstddef>
 #include <limits>
 
+#include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/column.hpp>
 #include <cairn/filter/column_shapes.hpp>
@@ -22,21 +23,44 @@
 
 namespace cairn::inline CAIRN_ABI::detail {
 
-/// a = U diag(d) U^T for a symmetric positive semi-definite a, from the last column on. False where a pivot
-/// is negative beyond rounding, or not finite.
+/// U diag(d) U^T = root root^T for any root, by reflections, last row first.
+template <int N, class S>
+void ud_of_root(const Matrix<N, N, S>& root, Matrix<N, N, S>& u, Vector<N, S>& d) {
+  Matrix<N, N, S> array;
+  for (int j = 0; j < N; ++j)
+    for (int k = 0; k < N; ++k) array(k, N - 1 - j) = root(j, k);
+  triangularise(array);
+  u.setIdentity();
+  for (int j = 0; j < N; ++j) {
+    const S deviation = array(N - 1 - j, N - 1 - j);
+    d(j) = deviation * deviation;
+    for (int i = 0; i < j; ++i)
+      u(i, j) = deviation > S(0) ? array(N - 1 - j, N - 1 - i) / deviation : S(0);
+  }
+}
+
+/// a = U diag(d) U^T for a covariance that elimination in the given order cannot be trusted with. False where
+/// `a` is none.
+template <int N, class S>
+[[nodiscard, gnu::cold, gnu::noinline]] bool singular_ud_factor(const Matrix<N, N, S>& a, Matrix<N, N, S>& u,
+                                                                Vector<N, S>& d) {
+  PivotedRoot<N, S> pivoted;
+  if (!pivoted_root<N, S>(a, pivoted)) return false;
+  ud_of_root<N, S>(pivoted.root, u, d);
+  return true;
+}
+
+/// a = U diag(d) U^T for a symmetric positive semi-definite a, from the last column on. False where it is none.
 template <int N, class S>
 [[nodiscard]] bool ud_factor(const Matrix<N, N, S>& a, Matrix<N, N, S>& u, Vector<N, S>& d) {
-  constexpr S slack = S(64) * std::numeric_limits<S>::epsilon();
   Column<N, S> columns[N];
   for (int j = 0; j < N; ++j) columns[j].load(a.data() + j * N);
   u.setIdentity();
   for (int j = N - 1; j >= 0; --j) {
     const S pivot = columns[j][j];
-    const bool regular = pivot > slack * a(j, j);
-    if (!regular && !(pivot >= -slack * a(j, j) && a(j, j) < std::numeric_limits<S>::infinity()))
-      return false;
-    d(j) = regular ? pivot : S(0);
-    if (!regular) continue;
+    if (!(pivot > rounding_share<S> * a(j, j)) || !(pivot <= std::numeric_limits<S>::max()))
+      return singular_ud_factor<N, S>(a, u, d);
+    d(j) = pivot;
     const S inverse = S(1) / pivot;
     for (int i = 0; i < j; ++i) {
       u(i, j) = columns[j][i] * inverse;
@@ -59,11 +83,12 @@ template <class Q, int N>
   return filled;
 }
 
-/// ud_factor() for a structured matrix: number by number, without its zeros, in registers.
+/// ud_factor() for a structured matrix: number by number, without its zeros, in registers. False says no more
+/// than that a pivot is rounding, or none: ud_factor() of the dense matrix must look.
 template <class Q, int N, class S>
 [[gnu::always_inline]] [[nodiscard]] inline bool ud_factor(const Q& q, Column<N, S> (&u)[N], S (&d)[N]) {
   static constexpr auto filled = filled_pattern<Q, N>();
-  constexpr S slack = S(64) * std::numeric_limits<S>::epsilon();
+  constexpr S slack = rounding_share<S>;
   const auto holds = [](int i, int j) __attribute__((always_inline)) {
     return filled[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)];
   };
@@ -79,15 +104,16 @@ template <class Q, int N, class S>
     const int j = N - 1 - back;
     const S pivot = a[j][j];
     const bool regular = pivot > slack * original[j];
-    good = good && (regular || pivot >= -slack * original[j]) &&
-           original[j] < std::numeric_limits<S>::infinity();
+    bool alone = pivot == S(0);  // nor anything above it
     d[j] = regular ? pivot : S(0);
     const S inverse = regular ? S(1) / pivot : S(0);
     S column[N]{};
     column[j] = S(1);
     each<N>(0, j, [&](int i) {
       if (holds(i, j)) column[i] = a[j][i] * inverse;
+      if (holds(i, j)) alone = alone && a[j][i] == S(0);
     });
+    good = good && (regular || alone);
     each<N>(0, j, [&](int i) __attribute__((always_inline)) {
       each<N>(0, i + 1, [&](int k) {
         if (holds(i, j) && holds(k, j)) a[i][k] -= column[i] * a[j][k];

@@ -16,6 +16,10 @@
 #include <concepts>
 #include <limits>
 
+#include <cairn/core/cholesky.hpp>
+#include <cairn/core/factor.hpp>
+#include <cairn/core/linalg.hpp>
+#include <cairn/filter/array_update.hpp>
 #include <cairn/filter/correct.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
@@ -29,23 +33,32 @@ namespace cairn::inline CAIRN_ABI {
 namespace detail {
 
 /// The update when only moments are known: C = cov(x, z) and S = cov(z), both used up, S lower triangle.
-/// Same checks as correct().
-template <Manifold X, int M, class S>
+/// Same checks as correct(); digits_of_points(), and again() as in reconsider().
+template <Manifold X, int M, class S, class Again>
 [[gnu::always_inline]] inline void correct_by_moments(Gaussian<X>& belief, Column<dof<X>, S> (&cross)[M],
-                                                      Innovation<M, S>& in, double gate) {
+                                                      Innovation<M, S>& in, double gate, S digits,
+                                                      const Again& again) {
   constexpr int n = dof<X>;
   Candidate<n, M, S> out{};
   Column<n, S>(&p)[n] = out.covariance;
   load_columns(belief.covariance, p);
   Correction<n, M, S> c;
-  bool good = c.fill(in.covariance, cross);
+  const bool regular = c.fill(in.covariance, cross);
+  digits *= c.loss;
+  const bool sound = regular && digits < S(1);
   in.nis = c.take(in.residual.data(), out.step);
   lower_by_squares(p, c.w);
-  good = good && gate > 0.0 && in.nis <= static_cast<S>(gate) && in.nis <= std::numeric_limits<S>::max() &&
-         is_covariance(p) && finite_state(belief.mean);
+  const bool good = sound && gate > 0.0 && in.nis <= static_cast<S>(gate) &&
+                    in.nis <= std::numeric_limits<S>::max() && keeps_digits<n, S>(p, belief.covariance, digits) &&
+                    is_covariance(p) && finite_state(belief.mean);
   if (!good) [[unlikely]] {
-    in.status = diagnose<M, S>(in, belief.covariance, gate);
-    return;
+    out.innovation = in;
+    if (finite_state(belief.mean))
+      reconsider(out, belief.covariance, gate, sound, again);
+    else
+      out.innovation.status = gate > 0.0 ? Status::not_finite : Status::bad_option;
+    in = out.innovation;
+    if (in.status != Status::accepted) return;
   }
   Tangent<X> step;
   out.step_to(step);
@@ -54,54 +67,42 @@ template <Manifold X, int M, class S>
 }
 
 /// The same from matrices.
-template <Manifold X, int M, class S>
+template <Manifold X, int M, class S, class Again>
 void correct_by_moments(Gaussian<X>& belief, const Matrix<dof<X>, M, S>& cross, Innovation<M, S>& in,
-                        double gate) {
+                        double gate, S digits, const Again& again) {
   constexpr int n = dof<X>;
   in.covariance = symmetrised(in.covariance);
   Column<n, S> columns[M];
   for (int j = 0; j < M; ++j) columns[j].load(cross.data() + j * n);
-  correct_by_moments<X, M, S>(belief, columns, in, gate);
+  correct_by_moments<X, M, S>(belief, columns, in, gate, digits, again);
 }
-template <Manifold X, int M, class S>
+template <Manifold X, int M, class S, class Again>
   requires(dof<X> == dynamic || M == dynamic)
 void correct_by_moments(Gaussian<X>& belief, const Matrix<dof<X>, M, S>& cross, Innovation<M, S>& in,
-                        double gate) {
+                        double gate, S digits, const Again& again) {
+  constexpr int n = dof<X>;
   in.covariance = symmetrised(in.covariance);
-  const int m = static_cast<int>(in.residual.size());
-  Matrix<M, M, S> lower = in.covariance;
-  const bool regular = checked_root<M, S>(in.covariance, lower) && (lower.diagonal().array() > S(0)).all();
-  Matrix<dof<X>, M, S> w = cross;
-  Vector<M, S> y = in.residual;
-  for (int j = 0; j < m; ++j) {
-    for (int k = 0; k < j; ++k) {
-      w.col(j) -= lower(j, k) * w.col(k);
-      y(j) -= lower(j, k) * y(k);
-    }
-    w.col(j) /= lower(j, j);
-    y(j) /= lower(j, j);
-  }
+  const Cholesky<M, S> root(in.covariance);
+  digits /= root.least_share();
+  const bool sound = root.good() && digits < S(1);
+  const Matrix<M, n, S> w = root.whiten(Matrix<M, n, S>(cross.transpose()));  // S^-1/2 C^T
+  const Vector<M, S> y = root.whiten(in.residual);
   in.nis = y.dot(y);
-  const CovarianceOf<X> next = symmetrised(belief.covariance - w * w.transpose());
-  if (!regular || !(gate > 0.0) || !(in.nis <= static_cast<S>(gate)) ||
-      !(in.nis <= std::numeric_limits<S>::max()) || !is_valid_covariance<dof<X>, S>(next) ||
-      !finite_state(belief.mean)) {
-    in.status = diagnose<M, S>(in, belief.covariance, gate);
+  Candidate<n, M, S> out{in, w.transpose() * y, symmetrised(belief.covariance - w.transpose() * w)};
+  if (!finite_state(belief.mean)) {
+    in.status = gate > 0.0 ? Status::not_finite : Status::bad_option;
     return;
   }
-  belief.mean = retract(belief.mean, Tangent<X>(w * y));
-  belief.covariance = next;
-}
-
-template <Manifold X, int M>
-[[nodiscard]] Innovation<M, ScalarOf<X>> correct_by_moments(Gaussian<X>& belief,
-                                                            const Matrix<dof<X>, M, ScalarOf<X>>& cross,
-                                                            const Matrix<M, M, ScalarOf<X>>& covariance,
-                                                            const Vector<M, ScalarOf<X>>& residual,
-                                                            double gate) {
-  auto in = fresh_innovation<M, ScalarOf<X>>(residual, covariance);
-  correct_by_moments<X, M, ScalarOf<X>>(belief, cross, in, gate);
-  return in;
+  if (!sound || !(gate > 0.0) || !(in.nis <= static_cast<S>(gate)) ||
+      !(in.nis <= std::numeric_limits<S>::max()) ||
+      !keeps_digits<n, S>(out.covariance, belief.covariance, digits) ||
+      !is_valid_covariance<n, S>(out.covariance)) {
+    reconsider(out, belief.covariance, gate, sound, again);
+    in = out.innovation;
+    if (in.status != Status::accepted) return;
+  }
+  belief.mean = retract(belief.mean, Tangent<X>(out.step));
+  belief.covariance = out.covariance;
 }
 
 }  // namespace detail
@@ -155,8 +156,11 @@ struct Unscented {
       const auto out = detail::unscented_transform(
           belief.mean, root, [&](const X& x) -> Z { return sensor.predict(x); }, c2, beta_minus_alpha2());
       auto in = detail::fresh_innovation<m, S>(local(out.mean, z), out.covariance);
-      in.covariance += Matrix<m, m, S>(sensor.noise(belief.mean));
-      detail::correct_by_moments<X, m, S>(belief, out.cross, in, gate);
+      const Matrix<m, m, S> r = sensor.noise(belief.mean);
+      in.covariance += r;
+      const S digits = detail::digits_of_points(belief.mean, belief.covariance, out.mean, in.covariance);
+      detail::correct_by_moments<X, m, S>(belief, out.cross, in, gate, digits,
+                                          by_array(belief, sensor, r, in, c2, digits));
       return in;
     } else {
       constexpr int n = dof<X>;
@@ -176,12 +180,43 @@ struct Unscented {
           in.covariance(a, b) = in.covariance(b, a) = moments.covariance[b][a] + r(a, b);
         });
       });
-      detail::correct_by_moments<X, m, S>(belief, moments.cross, in, gate);
+      const S digits = detail::digits_of_points(belief.mean, belief.covariance, center, in.covariance);
+      detail::correct_by_moments<X, m, S>(belief, moments.cross, in, gate, digits,
+                                          by_array(belief, sensor, r, in, c2, digits));
       return in;
     }
   }
 
 private:
+  /// The update by the array of square_root.hpp, for reconsider().
+  template <class H, Manifold X, int M, class S>
+  [[nodiscard]] auto by_array(const Gaussian<X>& belief, const H& sensor, const Matrix<M, M, S>& r,
+                              const Innovation<M, S>& in, double c2, S digits) const {
+    return [&, c2, digits](detail::ArrayUpdate<dof<X>, M, S>& update) {
+      using Z = typename H::Measurement;
+      constexpr int n = dof<X>;
+      const int ns = static_cast<int>(belief.covariance.rows()), ms = static_cast<int>(in.residual.size());
+      CovarianceOf<X> root = belief.covariance;
+      Matrix<M, M, S> root_r = r;
+      if (!detail::checked_root<n, S>(belief.covariance, root) || !detail::checked_root<M, S>(r, root_r))
+        return Status::not_positive_definite;
+      constexpr int rows = n == dynamic || M == dynamic ? dynamic : 2 * n + 1 + M;
+      constexpr int size = detail::size_sum<M, n>;
+      Matrix<rows, size, S> array = Matrix<rows, size, S>::Zero(2 * ns + 1 + ms, ms + ns);
+      static_cast<void>(detail::sigma_rows(
+          belief.mean, root, [&](const X& x) -> Z { return sensor.predict(x); }, c2, beta_minus_alpha2(),
+          array));
+      detail::put_transposed(array, 0, ms, root);
+      detail::put_transposed(array, 2 * ns + 1, 0, root_r);
+      if (!all_finite(array)) return Status::not_positive_definite;
+      const Matrix<M, n, S> slope = detail::mean_slope<M, n, S>(array, root, ms);
+      update = detail::update_by_array<n, M, S>(array, in.residual, ns);
+      const bool good = update.regular &&
+                        detail::determined<n, M, S>(update, root, slope, r, detail::KeptAs::covariance, digits);
+      return good ? Status::accepted : Status::not_positive_definite;
+    };
+  }
+
   /// Predict for sizes known at compile time.
   template <Manifold X, class F, class Q>
     requires(dof<X> != dynamic)
@@ -208,6 +243,9 @@ private:
     const X mean = retract(center, step);
     if (!detail::finite_variances(p) || !detail::finite_state(mean)) [[unlikely]]
       return detail::diagnose_prediction(p, mean);
+    if (!detail::looks_like_noise<n>(q)) [[unlikely]]
+      if (const Status status = detail::judge_noise<n, S>(detail::dense_of(q)); status != Status::accepted)
+        return status;
     if (!detail::is_covariance(p)) [[unlikely]]
       return Status::not_positive_definite;
     belief.mean = mean;
@@ -222,6 +260,7 @@ private:
     using S = ScalarOf<X>;
     CovarianceOf<X> root = belief.covariance;
     if (!detail::checked_root<dof<X>, S>(belief.covariance, root)) return refusal<X>(belief);
+    if (const Status status = detail::judge_noise<dof<X>, S>(q); status != Status::accepted) return status;
     const auto next = detail::unscented_transform(
         belief.mean, root, [&](const X& x) -> X { return f(x); }, c2, beta_minus_alpha2());
     CovarianceOf<X> covariance = next.covariance * static_cast<S>(fading);

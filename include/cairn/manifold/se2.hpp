@@ -87,7 +87,8 @@ private:
       return {S(1) - squared / S(6) * (S(1) - squared / S(20) * (S(1) - squared / S(42))),
               a * S(0.5) * (S(1) - squared / S(12) * (S(1) - squared / S(30) * (S(1) - squared / S(56))))};
     }
-    return {sin(a) / a, (S(1) - cos(a)) / a};
+    const S half = a * S(0.5), s = sin(half), twice = S(2) * s / a;  // 1 - cos a = 2 sin^2 (a / 2)
+    return {twice * cos(half), twice * s};
   }
 
   BasicSO2<S> rotation_;

@@ -13,6 +13,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
@@ -42,13 +43,27 @@ public:
   /// The identity.
   BasicSO3() : w_(1), v_(Vector<3, S>::Zero()) {}
 
-  /// From a quaternion of any positive length. Throws Error where it is zero or not finite.
+  /// From a quaternion of any length above zero, however small or large. Throws Error where it is zero or not
+  /// finite.
   [[nodiscard]] static BasicSO3 from_quaternion(const S& w, const S& x, const S& y, const S& z) {
     using std::sqrt;
-    const S length = sqrt(w * w + x * x + y * y + z * z);
-    if (!(length > S(0)) || !(length - length == S(0)))
+    constexpr auto least = std::numeric_limits<S>::min() / std::numeric_limits<S>::epsilon();
+    const S squared = w * w + x * x + y * y + z * z;
+    if (squared > S(least) && squared <= S(std::numeric_limits<S>::max())) [[likely]] {
+      const S length = sqrt(squared);
+      return BasicSO3(w / length, Vector<3, S>(x / length, y / length, z / length));
+    }
+    const S numbers[] = {w, x, y, z};
+    S largest(0);  // the squares are beyond what S holds, the quaternion may not be
+    bool finite = true;
+    for (const S& number : numbers) {
+      const S size = number < S(0) ? S(-number) : number;
+      finite = finite && size - size == S(0);
+      if (size > largest) largest = size;
+    }
+    if (!finite || !(largest > S(0)))
       raise("SO3::from_quaternion: expected four finite numbers that are not all zero");
-    return BasicSO3(w / length, Vector<3, S>(x / length, y / length, z / length));
+    return from_quaternion(w / largest, x / largest, y / largest, z / largest);
   }
 
   /// The rotation nearest to `m`. Throws Error where m^T m differs from I by more than `tolerance` in an

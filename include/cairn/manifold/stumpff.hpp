@@ -9,7 +9,8 @@
 ///   c_k = 1/k! - x c_{k+2}                                                               (1)
 ///
 /// (K. Stumpff, Himmelsmechanik I, 1959.) Below x = 1 the last two come from their series and the others from
-/// (1) downwards, which loses nothing; above it, from sine and cosine upwards.
+/// (1) downwards, which loses nothing. Above it the first two come from sine and cosine, and the others, as long
+/// as (1) upwards would lose digits (x < 10, just beyond half a turn), from longer series and (1) downwards.
 #pragma once
 
 #include <cmath>
@@ -46,6 +47,20 @@ template <class S>
     c[2] = S(1) / S(2) - x * c[4];
     c[1] = S(1) - x * c[3];
     c[0] = S(1) - x * c[2];
+  } else if (x < S(10)) {
+    const S angle = sqrt(x);
+    c[4] = S(1);
+    c[5] = S(1);
+    for (int j = 14; j >= 1; --j) {
+      c[4] = S(1) - x * c[4] / S((2 * j + 3) * (2 * j + 4));
+      c[5] = S(1) - x * c[5] / S((2 * j + 4) * (2 * j + 5));
+    }
+    c[4] = c[4] / S(24);
+    c[5] = c[5] / S(120);
+    c[3] = S(1) / S(6) - x * c[5];
+    c[2] = S(1) / S(2) - x * c[4];
+    c[0] = cos(angle);
+    c[1] = sin(angle) / angle;
   } else {
     const S angle = sqrt(x);
     c[0] = cos(angle);

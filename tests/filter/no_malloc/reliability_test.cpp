@@ -157,7 +157,7 @@ TEST_SUITE("reliability") {
     CHECK(std::abs((d * belief.mean)(0) - 0.5) < 1e-14);
     CHECK((d * belief.covariance).norm() < 1e-14);
     Gaussian<Vector<3>> certain{Vector<3>::Zero(), Matrix<3>::Zero()};
-    CHECK(cairn::constrain<Vector<3>, 1>(certain, d, c) == Status::not_positive_definite);
+    CHECK(cairn::constrain<Vector<3>, 1>(certain, d, c) == Status::contradiction);
   }
 
   TEST_CASE("robust: softens an outlier to its limit and leaves good data alone") {
