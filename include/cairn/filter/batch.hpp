@@ -19,6 +19,7 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kernels.hpp>
+#include <cairn/filter/matrix_of.hpp>
 #include <cairn/filter/structure.hpp>
 #include <cairn/version.hpp>
 
@@ -98,17 +99,20 @@ private:
 struct BatchKalman {
   double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
 
-  /// Adds the process noise Q to every belief: states that stand still but for a random walk. O(size).
-  template <int N, class S>
-  void drift(GaussianBatch<N, S>& batch, const Matrix<N, N, S>& q) const {
+  /// Adds the process noise Q to every belief: states that stand still but for a random walk. Throws Error
+  /// where Q has another run-time size. O(size).
+  template <int N, class S, MatrixOf<N, N, S> Q>
+  void drift(GaussianBatch<N, S>& batch, const Q& noise) const {
+    const Matrix<N, N, S> q = fitting<N, S>(noise);
     for (auto& block : batch.blocks())
       for (int i = 0; i < N; ++i)
         for (int j = 0; j <= i; ++j) block.covariance[batch.place(i, j)] += q(i, j);
   }
 
-  /// x <- F x, P <- F P F^T + Q for every belief, the same F (a Matrix or Structured) and Q.
-  template <int N, class S, class F>
-  void predict(GaussianBatch<N, S>& batch, const F& f, const Matrix<N, N, S>& q) const;
+  /// x <- F x, P <- F P F^T + Q for every belief, the same F and Q (anything that stands for a matrix).
+  /// Throws Error where one has another run-time size.
+  template <int N, class S, MatrixOf<N, N, S> F, MatrixOf<N, N, S> Q>
+  void predict(GaussianBatch<N, S>& batch, const F& f, const Q& noise) const;
 
   /// Belief i takes in measurement i = N(z_i, R_i) of all its states (H = I). Returns how many were kept;
   /// `kept`, where given, gets a 1 or 0 for each. Throws Error where the sizes differ. A lane whose numbers
@@ -116,6 +120,15 @@ struct BatchKalman {
   template <int N, class S>
   std::size_t update(GaussianBatch<N, S>& batch, const GaussianBatch<N, S>& seen,
                      std::span<std::uint8_t> kept = {}) const;
+
+private:
+  template <int N, class S, class A>
+  [[nodiscard]] static Matrix<N, N, S> fitting(const A& a) {
+    bool misfit = false;
+    const Matrix<N, N, S> plain = detail::plain_matrix<N, N, S>(a, N, N, misfit);
+    if (misfit) raise("BatchKalman: expected a square matrix with a row for each number of a belief");
+    return plain;
+  }
 };
 
 namespace detail {
@@ -192,11 +205,12 @@ std::size_t BatchKalman::update(GaussianBatch<N, S>& batch, const GaussianBatch<
   return count;
 }
 
-template <int N, class S, class F>
-void BatchKalman::predict(GaussianBatch<N, S>& batch, const F& f, const Matrix<N, N, S>& q) const {
+template <int N, class S, MatrixOf<N, N, S> F, MatrixOf<N, N, S> Q>
+void BatchKalman::predict(GaussianBatch<N, S>& batch, const F& f, const Q& noise) const {
   using Batch = GaussianBatch<N, S>;
   using Lane = typename Batch::Lane;
-  const Matrix<N, N, S> a = detail::dense_of(f);
+  const Matrix<N, N, S> a = fitting<N, S>(f);
+  const Matrix<N, N, S> q = fitting<N, S>(noise);
   for (auto& block : batch.blocks()) {
     Lane u[N][N];  // F P
     Lane x[N];

@@ -34,38 +34,34 @@ struct Extended {
   double tolerance = 1e-10;        ///< iterations end when the step changes by less, in standard deviations
 
   /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite.
-  template <LinearisedProcess F>
-  Status predict(Gaussian<typename F::State>& belief, const F& process, const typename F::Control& control,
-                 double dt) const {
-    if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
-    if (!(fading >= 1.0) || !(stabilising_noise >= 0.0)) return Status::bad_option;
-    return detail::advance(belief, process.propagate(belief.mean, control, dt),
-                           process.jacobian(belief.mean, control, dt),
-                           process.noise(belief.mean, control, dt), fading, stabilising_noise);
+  template <class F, class U = typename F::Control>
+    requires(LinearisedProcess<F> || detail::explain_sizes<F>)
+  Status predict(Gaussian<typename F::State>& belief, const F& process, const U& control, double dt) const {
+    return detail::predict_linearised(belief, process, control, dt, fading, stabilising_noise);
   }
-  template <LinearisedProcess F>
-    requires std::same_as<typename F::Control, NoControl>
+  template <class F>
+    requires(LinearisedProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
   Status predict(Gaussian<typename F::State>& belief, const F& process, double dt) const {
     return predict(belief, process, NoControl{}, dt);
   }
 
   /// Takes in the measurement z, or refuses it and leaves the belief as it was. The innovation is the one
   /// before the update, whatever the iterations.
-  template <LinearisedMeasurement H>
+  template <class H, class V = typename H::Measurement>
+    requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
-      Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
-    using X = typename H::State;
-    constexpr int m = dof<typename H::Measurement>;
-    const auto residual = local(typename H::Measurement(sensor.predict(belief.mean)), z);
+      Gaussian<typename H::State>& belief, const H& sensor, const V& z) const {
+    const detail::PlainSensor plain(sensor, detail::common_size(belief.mean, belief.covariance), z);
     if (iterations == 1) [[likely]]
-      return detail::correct<X, m>(belief, sensor.jacobian(belief.mean),
-                                   detail::dense_of(sensor.noise(belief.mean)), residual, gate, form);
-    Gaussian<X> first = belief;
-    auto innovation =
-        detail::correct<X, m>(first, sensor.jacobian(belief.mean),
-                              detail::dense_of(sensor.noise(belief.mean)), residual, gate, form);
+      return detail::update_linearised(belief, plain, gate, form);
+    Gaussian<typename H::State> first = belief;
+    auto innovation = detail::update_linearised(first, plain, gate, form);
     if (iterations < 1) innovation.status = Status::bad_option;
-    if (innovation.accepted()) innovation.status = iterate(belief, sensor, z);
+    if (!innovation.accepted()) return innovation;
+    first = belief;
+    innovation.status = iterate(first, plain, plain.z());
+    if (plain.misfit()) innovation.status = Status::size_mismatch;
+    if (innovation.accepted()) belief = first;
     return innovation;
   }
 

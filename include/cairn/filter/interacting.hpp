@@ -18,10 +18,12 @@
 #include <tuple>
 #include <utility>
 
+#include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
@@ -34,7 +36,18 @@ struct ModeBelief {
   std::array<double, R> probability;
 
   /// One Gaussian with the mixture's mean (two rounds of tangent averaging) and covariance.
-  [[nodiscard]] Gaussian<X> combined() const { return mixture(modes, probability); }
+  [[nodiscard]] Gaussian<X> combined() const {
+    CAIRN_EXPECTS(fits(), "the modes of a belief have one size");
+    return mixture(modes, probability);
+  }
+
+  /// The modes have one size, and their covariances fit it. Always so where that size is fixed.
+  [[nodiscard]] bool fits() const {
+    const int n = detail::common_size(modes[0].mean, modes[0].covariance);
+    bool good = n > 0;
+    for (const Gaussian<X>& mode : modes) good = good && detail::common_size(mode.mean, mode.covariance) == n;
+    return good;
+  }
 
   /// The moments of a mixture with the given weights.
   [[nodiscard]] static Gaussian<X> mixture(const std::array<Gaussian<X>, R>& parts,
@@ -65,12 +78,12 @@ struct Interacting {
   std::array<std::array<double, R>, R> switching{};
 
   /// Mixes, then moves every mode by its own process of `processes`. All or none are kept.
-  template <Manifold X, class... F>
+  template <Manifold X, class... F, class U = typename std::tuple_element_t<0, std::tuple<F...>>::Control>
     requires(sizeof...(F) == R)
-  Status predict(ModeBelief<X, R>& belief, const std::tuple<F...>& processes,
-                 const typename std::tuple_element_t<0, std::tuple<F...>>::Control& control,
+  Status predict(ModeBelief<X, R>& belief, const std::tuple<F...>& processes, const U& control,
                  double dt) const {
     if (!stochastic()) return Status::bad_option;
+    if (!belief.fits()) return Status::size_mismatch;
     ModeBelief<X, R> next = belief;
     for (std::size_t j = 0; j < R; ++j) {
       std::array<double, R> weights{};
@@ -94,9 +107,10 @@ struct Interacting {
 
   /// Every mode takes in z; a mode that refuses keeps its belief and loses its weight. Refused by all: the
   /// first mode's reason, and the belief as it was.
-  template <MeasurementModel H>
-  Status update(ModeBelief<typename H::State, R>& belief, const H& sensor,
-                const typename H::Measurement& z) const {
+  template <class H, class V = typename H::Measurement>
+    requires(MeasurementModel<H> || detail::explain_sizes<H>)
+  Status update(ModeBelief<typename H::State, R>& belief, const H& sensor, const V& z) const {
+    if (!belief.fits()) return Status::size_mismatch;
     ModeBelief<typename H::State, R> next = belief;
     std::array<double, R> weight{};
     Status first_refusal = Status::accepted;

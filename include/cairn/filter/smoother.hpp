@@ -19,12 +19,14 @@
 #include <optional>
 #include <vector>
 
+#include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kalman.hpp>
 #include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/sigma_points.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/filter/unscented.hpp>
@@ -43,23 +45,31 @@ struct RecordedStep {
 
 namespace detail {
 
-template <class Filter, class F>
+template <class Filter, class F, class U>
 [[nodiscard]] CovarianceOf<typename F::State> cross_covariance(const Filter& filter,
                                                                const Gaussian<typename F::State>& belief,
-                                                               const F& process, const typename F::Control& u,
-                                                               double dt) {
+                                                               const F& process, const U& u, double dt) {
   using X = typename F::State;
+  const PlainProcess plain(process, common_size(belief.mean, belief.covariance), u);
   if constexpr (std::same_as<Filter, Unscented>) {
-    const auto f = [&](const X& x) -> X { return process.propagate(x, u, dt); };
+    const auto f = [&](const X& x) -> X { return plain.propagate(x, dt); };
     const CovarianceOf<X> root = semi_definite_root<dof<X>, ScalarOf<X>>(belief.covariance);
     const SigmaPoints& points = filter.points;
     return unscented_transform(belief.mean, root, f, points.spread_squared(static_cast<int>(root.rows())),
                                points.beta - points.alpha * points.alpha)
         .cross;
   } else {
-    const CovarianceOf<X> f = dense_of(process.jacobian(belief.mean, u, dt));
+    const CovarianceOf<X> f = dense_of(plain.jacobian(belief.mean, dt));
     return belief.covariance * f.transpose();
   }
+}
+
+/// All of one size, as those of a Recorder are.
+template <Manifold X>
+[[nodiscard]] bool fits_together(const RecordedStep<X>& step, const Gaussian<X>& after) {
+  const int n = common_size(step.before.mean, step.before.covariance);
+  return n > 0 && common_size(step.predicted.mean, step.predicted.covariance) == n &&
+         common_size(after.mean, after.covariance) == n && has_size(step.cross, n, n);
 }
 
 /// cross * predicted^-1. A direction without predicted uncertainty is not corrected.
@@ -84,6 +94,7 @@ template <Manifold X>
 /// The belief before `step`, corrected by what became known of the state after it.
 template <Manifold X>
 [[nodiscard]] Gaussian<X> smooth_back(const RecordedStep<X>& step, const Gaussian<X>& after) {
+  CAIRN_EXPECTS(detail::fits_together(step, after), "smooth_back needs beliefs of one size");
   const CovarianceOf<X> gain = detail::smoother_gain(step);
   constexpr int n = dof<X>;
   const Tangent<X> correction =
@@ -101,22 +112,24 @@ class Recorder {
 public:
   Recorder(const Filter& filter, const Gaussian<X>& prior) : filter_(filter), belief_(prior) {}
 
-  template <ProcessModel F>
-  Status predict(const F& process, const typename F::Control& control, double dt) {
+  template <class F, class U = typename F::Control>
+    requires(ProcessModel<F> || detail::explain_sizes<F>)
+  Status predict(const F& process, const U& control, double dt) {
     const Gaussian<X> before = belief_;
     const Status status = filter_.predict(belief_, process, control, dt);
     if (status == Status::accepted)
       steps_.push_back({before, belief_, detail::cross_covariance(filter_, before, process, control, dt)});
     return status;
   }
-  template <ProcessModel F>
-    requires std::same_as<typename F::Control, NoControl>
+  template <class F>
+    requires(ProcessModel<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
   Status predict(const F& process, double dt) {
     return predict(process, NoControl{}, dt);
   }
 
-  template <MeasurementModel H>
-  auto update(const H& sensor, const typename H::Measurement& z) {
+  template <class H, class V = typename H::Measurement>
+    requires(MeasurementModel<H> || detail::explain_sizes<H>)
+  auto update(const H& sensor, const V& z) {
     return filter_.update(belief_, sensor, z);
   }
 
