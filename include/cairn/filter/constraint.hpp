@@ -67,8 +67,7 @@ Status constrain(Gaussian<X>& belief, const D& d, const C& c) {
   const Eigen::Index rows = k != dynamic ? k : d.rows();
   const int n = detail::common_size(belief.mean, belief.covariance);
   const Matrix<k, dof<X>, S> plain_d = detail::plain_matrix<k, dof<X>, S>(d, rows, n, misfit);
-  const Vector<k, S> plain_c =
-      detail::plain_state<Vector<k, S>>(c, static_cast<int>(rows), Vector<k, S>{}, misfit);
+  const Vector<k, S> plain_c = detail::plain_vector<Vector<k, S>>(c, rows, misfit);
   return misfit ? Status::size_mismatch : constrain(belief, plain_d, plain_c);
 }
 

@@ -51,7 +51,7 @@ struct Gaussian {
     const int n = dof<X> != dynamic ? dof<X> : static_cast<int>(covariance.rows());
     const Covariance matrix = detail::plain_matrix<dof<X>, dof<X>, Scalar>(covariance, n, n, misfit);
     if constexpr (detail::is_vector<X>) {
-      const X center = detail::plain_state<X>(mean, n, X{}, misfit);
+      const X center = detail::plain_vector<X>(mean, n, misfit);
       if (misfit) detail::raise_sizes(mean.size(), covariance.rows(), covariance.cols());
       return checked(center, matrix);
     } else {

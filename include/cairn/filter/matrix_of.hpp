@@ -137,23 +137,30 @@ template <Manifold X, class A>
     return X(a);
 }
 
-/// The state that `given` stands for, of steps of `size` numbers; of another size, `other` and `misfit`.
+/// The vector of `size` numbers that `given` stands for; of another size, one of NaN and `misfit`.
+template <class X, class Given>
+[[nodiscard]] X plain_vector(Given&& given, Eigen::Index size, bool& misfit) {
+  using A = std::remove_cvref_t<Given>;
+  constexpr bool row = ShapeOf<A>::rows == 1 && dof<X> != 1;
+  if constexpr (dof<X> == dynamic || ShapeOf<A>::rows == dynamic || ShapeOf<A>::columns == dynamic)
+    if (!(row ? has_size(given, 1, size) : has_size(given, size, 1))) [[unlikely]] {
+      misfit = true;
+      return no_matrix<dof<X>, 1, ScalarOf<X>>(size, 1);
+    }
+  if constexpr (std::same_as<A, X>)
+    return std::forward<Given>(given);
+  else if constexpr (row)
+    return plain_copy<dof<X>, 1, ScalarOf<X>>(typename ShapeOf<A>::Type::PlainObject(given).transpose());
+  else
+    return plain_copy<dof<X>, 1, ScalarOf<X>>(given);
+}
+
+/// The state that `given` stands for, of steps of `size` numbers; of another size, NaN or `other`, and
+/// `misfit`.
 template <Manifold X, class Given>
 [[nodiscard]] X plain_state(Given&& given, int size, const X& other, bool& misfit) {
-  using A = std::remove_cvref_t<Given>;
-  if constexpr (is_vector<X> && OfEigen<A>) {
-    constexpr bool row = ShapeOf<A>::rows == 1 && dof<X> != 1;
-    if constexpr (dof<X> == dynamic || ShapeOf<A>::rows == dynamic || ShapeOf<A>::columns == dynamic)
-      if (!(row ? has_size(given, 1, size) : has_size(given, size, 1))) [[unlikely]] {
-        misfit = true;
-        return no_matrix<dof<X>, 1, ScalarOf<X>>(size, 1);
-      }
-    if constexpr (std::same_as<A, X>)
-      return std::forward<Given>(given);
-    else if constexpr (row)
-      return plain_copy<dof<X>, 1, ScalarOf<X>>(typename ShapeOf<A>::Type::PlainObject(given).transpose());
-    else
-      return plain_copy<dof<X>, 1, ScalarOf<X>>(given);
+  if constexpr (is_vector<X> && OfEigen<std::remove_cvref_t<Given>>) {
+    return plain_vector<X>(std::forward<Given>(given), size, misfit);
   } else {
     X x(std::forward<Given>(given));
     if constexpr (dof<X> == dynamic)

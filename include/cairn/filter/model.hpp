@@ -79,6 +79,7 @@ concept LinearProcess = LinearisedProcess<F> && F::linear;
 /// What a sensor reports of a state: predict and noise.
 template <class H>
 concept MeasurementModel = Manifold<typename H::State> && Manifold<typename H::Measurement> &&
+                           std::same_as<ScalarOf<typename H::State>, ScalarOf<typename H::Measurement>> &&
                            requires(const H& h, const typename H::State& x) {
                              { h.predict(x) } -> StateOf<typename H::Measurement>;
                              { h.noise(x) } -> detail::CovarianceLike<typename H::Measurement>;

@@ -41,8 +41,7 @@ public:
 private:
   [[nodiscard]] static T convert(const A& given, bool& misfit) {
     if constexpr (of_eigen && is_vector<T>) {
-      const int size = dof<T> != dynamic ? dof<T> : static_cast<int>(given.size());
-      return plain_state<T>(given, size, T{}, misfit);
+      return plain_vector<T>(given, dof<T> != dynamic ? dof<T> : given.size(), misfit);
     } else if constexpr (of_eigen) {
       constexpr int rows = ShapeOf<T>::rows, columns = ShapeOf<T>::columns;
       return plain_matrix<rows, columns, typename ShapeOf<T>::Scalar>(
@@ -125,6 +124,7 @@ public:
   }
   /// Packs (wide.hpp) instead of numbers.
   template <class Packs>
+    requires F::side_by_side
   [[gnu::always_inline]] auto propagate(const Packs& x, double dt) const {
     return model_.propagate(x, u(), dt);
   }
@@ -151,7 +151,7 @@ public:
 
   // In continuous time (kalman_bucy.hpp).
   [[nodiscard]] Tangent<State> rate(const State& x) const {
-    return plain_state<Tangent<State>>(model_.rate(x, u()), size_, Tangent<State>{}, misfit_);
+    return plain_vector<Tangent<State>>(model_.rate(x, u()), size_, misfit_);
   }
   [[nodiscard]] CovarianceOf<State> rate_jacobian(const State& x) const {
     return plain_matrix<n, n, S>(model_.rate_jacobian(x, u()), size_, size_, misfit_);
@@ -219,6 +219,7 @@ public:
   }
   /// Packs (wide.hpp) instead of numbers.
   template <class Packs>
+    requires H::side_by_side
   [[gnu::always_inline]] auto predict(const Packs& x) const {
     return model_.predict(x);
   }

@@ -42,9 +42,9 @@ template <MeasurementModel H>
 struct Inflated : H {
   double factor = 1.0;
   [[nodiscard]] auto noise(const typename H::State& x) const {
-    auto r = as_found(H::noise(x));
-    r *= static_cast<ScalarOf<typename H::State>>(factor);
-    return r;
+    auto inflated = as_found(H::noise(x));
+    inflated *= static_cast<ScalarOf<typename H::State>>(factor);
+    return inflated;
   }
 };
 
