@@ -110,6 +110,18 @@ struct GivenVectorHas {
                 "model's Measurement or Control");
 };
 
+template <class OfState, class OfMeasurement>
+struct NumberOfMeasurementIs {
+  static_assert(std::same_as<OfState, OfMeasurement>,
+                "cairn: a Measurement has the number type of the State it is taken of");
+};
+template <class Expected, class Found>
+struct TangentIs {
+  static_assert(
+      std::same_as<Expected, Found>,
+      "cairn: a step of a State is Vector<dof, Scalar>: manifold_traits<State>::Tangent has to be that");
+};
+
 /// Ends in the sentence of `Claim` where what stands for a matrix is not that of Size.
 template <template <class, class> class Claim, class Size, class A>
 consteval void claim() {
@@ -197,14 +209,29 @@ consteval void explain_conditional_sensor() {
   }
 }
 
+/// What is said of a state that is none because of its steps.
+template <class X>
+consteval void explain_state() {
+  if constexpr (requires {
+                  typename manifold_traits<X>::Scalar;
+                  typename manifold_traits<X>::Tangent;
+                  manifold_traits<X>::dof;
+                })
+    static_cast<void>(sizeof(TangentIs<Vector<manifold_traits<X>::dof, typename manifold_traits<X>::Scalar>,
+                                       typename manifold_traits<X>::Tangent>));
+}
+
 /// False, for a concept that is; or the sentence about the size that is wrong.
 template <class Model>
 inline constexpr bool explain_sizes = [] {
+  if constexpr (requires { typename Model::State; }) explain_state<typename Model::State>();
+  if constexpr (requires { typename Model::Measurement; }) explain_state<typename Model::Measurement>();
   if constexpr (requires { requires Manifold<typename Model::State>; }) {
     using X = typename Model::State;
     if constexpr (requires { typename Model::Control; }) explain_process<Model, X, typename Model::Control>();
     if constexpr (requires { requires Manifold<typename Model::Measurement>; }) {
       using Z = typename Model::Measurement;
+      static_cast<void>(sizeof(NumberOfMeasurementIs<ScalarOf<X>, ScalarOf<Z>>));
       explain_sensor<Model, X, Z>();
       if constexpr (requires { requires Manifold<typename Model::Part>; })
         explain_conditional_sensor<Model, X, typename Model::Part, Z>();

@@ -99,6 +99,10 @@ inline constexpr bool returns_plain = is_plain<std::remove_cvref_t<A>, R, C, S>;
 template <class A, class X>
 inline constexpr bool returns_state = dof<X> != dynamic && std::same_as<std::remove_cvref_t<A>, X>;
 
+/// To be called with packs (wide.hpp).
+template <class Model>
+inline constexpr bool side_by_side = requires { requires Model::side_by_side; };
+
 /// A process with the control it is given, for a state whose steps have `size` numbers.
 template <class F, class U = typename F::Control>
 class PlainProcess {
@@ -124,7 +128,7 @@ public:
   }
   /// Packs (wide.hpp) instead of numbers.
   template <class Packs>
-    requires F::side_by_side
+    requires side_by_side<F>
   [[gnu::always_inline]] auto propagate(const Packs& x, double dt) const {
     return model_.propagate(x, u(), dt);
   }
@@ -219,7 +223,7 @@ public:
   }
   /// Packs (wide.hpp) instead of numbers.
   template <class Packs>
-    requires H::side_by_side
+    requires side_by_side<H>
   [[gnu::always_inline]] auto predict(const Packs& x) const {
     return model_.predict(x);
   }
