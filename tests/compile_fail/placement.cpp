@@ -1,4 +1,4 @@
-// words: cairn: jacobian(x) of a placement; 6, 5, double; 5, 6, double
+// words: cairn: jacobian(x) of a placement; Expected<6, 5, double>; Found<5, 6, double>
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 #include <cairn/field/field_map.hpp>

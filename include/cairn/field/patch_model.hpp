@@ -51,11 +51,18 @@ concept FramePlacement = requires(const P& p, const typename P::State& x) {
 
 namespace detail {
 
+template <class A, class B>
+inline constexpr bool same_fixed_size = false;
+template <int R, int C, class S>
+inline constexpr bool same_fixed_size<Expected<R, C, S>, Found<R, C, S>> = true;
+
 template <class Expected, class Found>
 struct JacobianOfPlacementHas {
-  static_assert(std::same_as<Expected, Found>,
-                "cairn: jacobian(x) of a placement has six rows and a column for each number of its State, "
-                "of double, its sizes fixed");
+  static_assert(
+      same_fixed_size<Expected, Found>,
+      "cairn: jacobian(x) of a placement maps steps of its State to the six numbers of a placement, "
+      "its sizes fixed; Expected<rows, columns, number type> and Found<...> say what it has to be "
+      "and what it is");
 };
 
 /// False, for a FramePlacement that is; or the sentence about the size that is wrong.
@@ -67,7 +74,7 @@ inline constexpr bool explain_placement = [] {
     if constexpr (requires { typename FoundIn<A>; })
       if constexpr (!PlacementJacobian<A, P::State::RowsAtCompileTime>)
         static_cast<void>(
-            sizeof(JacobianOfPlacementHas<Found<6, P::State::RowsAtCompileTime, double>, FoundIn<A>>));
+            sizeof(JacobianOfPlacementHas<Expected<6, P::State::RowsAtCompileTime, double>, FoundIn<A>>));
   }
   return false;
 }();

@@ -42,74 +42,79 @@ template <int N, class S, int FoundR, int FoundC>
 inline constexpr bool same_vector<Expected<N, 1, S>, Found<FoundR, FoundC, S>> =
     (may_equal(N, FoundR) && may_equal(1, FoundC)) || (may_equal(1, FoundR) && may_equal(N, FoundC));
 
-// One for each thing a model says, so that the sentence names it.
+// One for each thing a model says, so that the sentence names it. "Expected" and "Found" stand beside it in
+// what the compiler prints.
 template <class Expected, class Found>
 struct NoiseOfProcessHas {
-  static_assert(same_size<Expected, Found>,
-                "cairn: noise(x, u, dt) of a process is the covariance of a step of its State (of its Noise, "
-                "where it has one): expected so many rows and columns, and the State's number type");
+  static_assert(
+      same_size<Expected, Found>,
+      "cairn: noise(x, u, dt) of a process is the covariance of a step of its State (of its Noise, where it "
+      "has one); Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
 };
 template <class Expected, class Found>
 struct JacobianOfProcessHas {
   static_assert(same_size<Expected, Found>,
-                "cairn: jacobian(x, u, dt) of a process maps steps of its State to steps of its State: "
-                "expected so many rows and columns, and the State's number type");
+                "cairn: jacobian(x, u, dt) of a process maps steps of its State to steps of its State; "
+                "Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
 };
 template <class Expected, class Found>
 struct PropagatedStateHas {
   static_assert(same_vector<Expected, Found>,
-                "cairn: propagate() of a process returns its State: expected a vector of so many numbers of "
-                "the State's number type");
+                "cairn: propagate() of a process returns its State; Expected<rows, columns, number type> and "
+                "Found<...> say what it has to be and what it is");
 };
 template <class Expected, class Found>
 struct NoiseOfSensorHas {
-  static_assert(same_size<Expected, Found>,
-                "cairn: noise(x) of a sensor is the covariance of a step of its Measurement (of its Noise, "
-                "where it has one): expected so many rows and columns, and the State's number type");
+  static_assert(
+      same_size<Expected, Found>,
+      "cairn: noise(x) of a sensor is the covariance of a step of its Measurement (of its Noise, where it "
+      "has one); Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
 };
 template <class Expected, class Found>
 struct JacobianOfSensorHas {
   static_assert(same_size<Expected, Found>,
-                "cairn: jacobian(x) of a sensor maps steps of its State to steps of its Measurement: "
-                "expected a row for each number of the Measurement, a column for each of the State");
+                "cairn: jacobian(x) of a sensor maps steps of its State to steps of its Measurement; "
+                "Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
 };
 template <class Expected, class Found>
 struct PredictedMeasurementHas {
   static_assert(same_vector<Expected, Found>,
-                "cairn: predict() of a sensor returns its Measurement: expected a vector of so many numbers "
-                "of the State's number type");
+                "cairn: predict() of a sensor returns its Measurement; Expected<rows, columns, number type> "
+                "and Found<...> say what it has to be and what it is");
 };
 template <class Expected, class Found>
 struct RateHas {
   static_assert(same_vector<Expected, Found>,
-                "cairn: rate(x, u) of a process in continuous time is a step of its State a second: expected "
-                "a vector of so many numbers of the State's number type");
+                "cairn: rate(x, u) of a process in continuous time is a step of its State a second; "
+                "Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
 };
 template <class Expected, class Found>
 struct RateJacobianHas {
-  static_assert(same_size<Expected, Found>,
-                "cairn: rate_jacobian(x, u) of a process in continuous time has a row and a column for each "
-                "number of a step of its State, of the State's number type");
+  static_assert(
+      same_size<Expected, Found>,
+      "cairn: rate_jacobian(x, u) of a process in continuous time maps steps of its State to rates; "
+      "Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
 };
 template <class Expected, class Found>
 struct SpectralDensityHas {
-  static_assert(same_size<Expected, Found>,
-                "cairn: spectral_density(x, u) of a process in continuous time has a row and a column for "
-                "each number of a step of its State, of the State's number type");
+  static_assert(
+      same_size<Expected, Found>,
+      "cairn: spectral_density(x, u) of a process in continuous time is a covariance of steps of its State a "
+      "second; Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
 };
 template <class Expected, class Found>
 struct JacobianByPartHas {
-  static_assert(same_size<Expected, Found>,
-                "cairn: part_jacobian(x, part) of a sensor has a row for each number of its Measurement and "
-                "a column for each of its Part, of the State's number type");
+  static_assert(
+      same_size<Expected, Found>,
+      "cairn: part_jacobian(x, part) of a sensor maps steps of its Part to steps of its Measurement; "
+      "Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
 };
 template <class Expected, class Found>
 struct GivenVectorHas {
   static_assert(same_vector<Expected, Found>,
-                "cairn: the measurement or control that was given has another size or number type than the "
-                "model's Measurement or Control");
+                "cairn: the measurement or control that was given is no Measurement or Control of the model; "
+                "Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
 };
-
 template <class OfState, class OfMeasurement>
 struct NumberOfMeasurementIs {
   static_assert(std::same_as<OfState, OfMeasurement>,
