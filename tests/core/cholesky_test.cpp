@@ -92,6 +92,11 @@ TEST_SUITE("Cholesky") {
     CHECK(refused((Matrix<2>() << 1, nan, nan, 1).finished()));
     CHECK(refused((Matrix<2>() << 1, 0, 0, inf).finished()));
     CHECK(refused(Matrix<2>::Zero()));
+    for (const auto& a : {Matrix<cairn::dynamic>::Identity(3, 2), Matrix<cairn::dynamic>::Identity(2, 3)}) {
+      const Cholesky<cairn::dynamic> factor(a);
+      CHECK_FALSE(factor.good());
+      CHECK_FALSE(factor.solve(Vector<cairn::dynamic>(Vector<cairn::dynamic>::Ones(a.rows()))).allFinite());
+    }
   }
 
   TEST_CASE("least_share: what the other rows leave of a row, whatever its unit") {

@@ -3,6 +3,7 @@
 //
 // The examples in the headers of cairn/index, compiled and run: each is cut out of its header by
 // CMakeLists.txt.
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <limits>
@@ -15,10 +16,12 @@
 #include <cairn/core/random.hpp>
 #include <cairn/index/axis_metrics.hpp>
 #include <cairn/index/best_bin_first.hpp>
+#include <cairn/index/box_query.hpp>
 #include <cairn/index/bulk_match.hpp>
 #include <cairn/index/descriptor_index.hpp>
 #include <cairn/index/kd_tree.hpp>
 #include <cairn/index/landmark_map.hpp>
+#include <cairn/index/multi_kd_tree.hpp>
 #include <cairn/index/nearest_first.hpp>
 #include <cairn/index/neighbors.hpp>
 #include <cairn/index/points.hpp>
@@ -60,6 +63,19 @@ TEST_CASE("docs: the example of kd_tree.hpp finds the nearest point and all with
 #include "snippets/index/kd_tree_1.inc"
   CHECK(used == std::vector<cairn::PointId>{1, 1, 0, 2, 1});
   CHECK(my_collector.id == 1);
+}
+
+TEST_CASE("docs: the example of multi_kd_tree.hpp finds what was not erased") {
+  const auto& points = three_points;
+  const std::array query{0.9F, 0.1F, 0.0F};
+  const std::array low{-1.0F, -1.0F, -1.0F}, high{9.0F, 9.0F, 9.0F};
+  std::vector<cairn::PointId> used;
+  const auto use = [&](cairn::PointId id) { used.push_back(id); };
+  Closest collector;
+#include "snippets/index/multi_kd_tree_1.inc"
+  CHECK(collector.id == 1);
+  std::sort(used.begin(), used.end());
+  CHECK(used == std::vector<cairn::PointId>{1, 2});
 }
 
 TEST_CASE("docs: the example of axis_metrics.hpp takes the shorter way round") {

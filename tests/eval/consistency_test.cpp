@@ -9,6 +9,7 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/random.hpp>
 #include <cairn/eval/consistency.hpp>
+#include <cairn/filter/gaussian.hpp>
 #include <cairn/manifold/se3.hpp>
 
 #include "support/random.hpp"
@@ -86,7 +87,7 @@ TEST_SUITE("consistency") {
     const cairn::SE3 estimate = cairn::SE3::exp(draw_tangent(1.0));
     const Vector<6> d = draw_tangent(0.3);
     const Matrix<6> P = Matrix<6>::Identity() * 0.04;
-    CHECK(*cairn::nees(cairn::retract(estimate, d), estimate, P) ==
+    CHECK(cairn::nees(cairn::Gaussian<cairn::SE3>{estimate, P}, cairn::retract(estimate, d)) ==
           doctest::Approx(d.squaredNorm() / 0.04).epsilon(1e-9));
   }
 

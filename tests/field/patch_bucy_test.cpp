@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <vector>
@@ -21,7 +22,71 @@
 using namespace cairn;
 using namespace cairn_test;
 
+namespace patch_bucy_test {
+namespace {
+
+// The motion and the placement, told in other matrices. Of run-time size the motion may tell of another.
+struct MotionAtRunTime : AlongTrackMotion {
+  int states = 5;
+  [[nodiscard]] Vector<dynamic> rate(const State& x, const Control& u) const {
+    Vector<dynamic> all = Vector<dynamic>::Zero(states);
+    all.head(std::min(states, 5)) = AlongTrackMotion::rate(x, u).head(std::min(states, 5));
+    return all;
+  }
+  [[nodiscard]] Eigen::Matrix<double, 5, 5, Eigen::RowMajor> rate_jacobian(const State& x,
+                                                                           const Control& u) const {
+    return AlongTrackMotion::rate_jacobian(x, u);
+  }
+};
+struct PlacementByRows : AlongTrackPlacement {
+  [[nodiscard]] Eigen::Matrix<double, 6, 5, Eigen::RowMajor> jacobian(const State& x) const {
+    return AlongTrackPlacement::jacobian(x);
+  }
+};
+
+}  // namespace
+}  // namespace patch_bucy_test
+
 TEST_SUITE("patch_bucy") {
+  TEST_CASE("patch_bucy: matrices told in other ways are the same, and sizes that do not fit are refused") {
+    using patch_bucy_test::MotionAtRunTime;
+    using patch_bucy_test::PlacementByRows;
+    Random random(5);
+    const BsplineMap map = ground(5);
+    const std::vector<double> z = frame(map, small, AlongTrackPlacement{}, usual_state, 0.02, random);
+    PatchScratch scratch;
+    const auto run = [&](Gaussian<Vector<5>>& belief, const auto& motion, const auto& where,
+                         const std::vector<double>& seen) {
+      return PatchBucy{}.integrate(
+          belief, motion, {}, where, map, small, [&](double) { return seen; }, 0.01, 0.0, 0.1, scratch);
+    };
+    Gaussian<Vector<5>> plain = prior(0.3), told = prior(0.3);
+    REQUIRE(run(plain, AlongTrackMotion{{0.01, 1e-5, 1e-5}}, AlongTrackPlacement{}, z) ==
+            PatchVerdict::accepted);
+    REQUIRE(run(told, MotionAtRunTime{{{0.01, 1e-5, 1e-5}}}, PlacementByRows{}, z) == PatchVerdict::accepted);
+    CHECK((told.mean == plain.mean));
+    CHECK((told.covariance == plain.covariance));
+    Gaussian<Vector<5>> filtered = prior(0.3), filtered_by_rows = prior(0.3);
+    const PatchNoise noise(0.01);
+    REQUIRE(PatchFilter{}.update(filtered, AlongTrackPlacement{}, map, small, z, noise, scratch).accepted());
+    REQUIRE(
+        PatchFilter{}.update(filtered_by_rows, PlacementByRows{}, map, small, z, noise, scratch).accepted());
+    CHECK((filtered.covariance == filtered_by_rows.covariance));
+
+    Gaussian<Vector<5>> belief = prior(0.3);
+    for (const int states : {0, 4, 6})
+      CHECK(run(belief, MotionAtRunTime{{}, states}, PlacementByRows{}, z) == PatchVerdict::size_mismatch);
+    std::vector<double> shorter(z.begin(), z.end() - 1), longer = z;
+    longer.push_back(0.0);
+    for (const std::vector<double>& other : {shorter, longer, std::vector<double>{}}) {
+      CHECK(run(belief, AlongTrackMotion{}, AlongTrackPlacement{}, other) == PatchVerdict::size_mismatch);
+      CHECK(PatchBucy{}.impulse(belief, AlongTrackPlacement{}, map, small, other, 0.01, scratch) ==
+            PatchVerdict::size_mismatch);
+    }
+    CHECK((belief.mean == prior(0.3).mean));
+    CHECK((belief.covariance == prior(0.3).covariance));
+  }
+
   TEST_CASE("patch_bucy: a constant slope has a closed form") {
     // f = x: only x_1 + ... is seen. With V known to be 0 the information about x grows as q t / S_0.
     FieldGrid ramp(140, 80, {0, -40, 1, 1});

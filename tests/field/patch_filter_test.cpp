@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 #include <cstdint>
+#include <stdexcept>
 #include <vector>
 
 #include <Eigen/Cholesky>
@@ -74,11 +75,11 @@ TEST_SUITE("patch_filter") {
         const Vector<5> truth = sample(belief, random);
         const std::vector<double> z = frame(world, shape, where, truth, 0.1, random);
         REQUIRE(PatchFilter{}.update(belief, where, map, shape, z, noise, scratch).accepted());
-        aware.add(*nees<Vector<5>>(truth, belief.mean, belief.covariance));
+        aware.add(nees(belief, truth));
         belief = start;
         REQUIRE(
             PatchFilter{}.update(belief, where, map, shape, z, PatchNoise(0.1 * 0.1), scratch).accepted());
-        white.add(*nees<Vector<5>>(truth, belief.mean, belief.covariance));
+        white.add(nees(belief, truth));
       }
       CAPTURE(aware.mean());
       CHECK(aware.band(0.999).contains(aware.mean()));
@@ -179,6 +180,20 @@ TEST_SUITE("patch_filter") {
     std::vector<double> noisy = z;
     for (double& value : noisy) value += random.normal();
     CHECK(verdict(map, noisy, {.gate = 2.0}, prior(1)) == PatchVerdict::gated);
+  }
+
+  TEST_CASE("patch_filter: correlated noise of another shape than the frame's is a broken promise") {
+    const auto previous =
+        set_violation_handler([](const Violation& violation) { throw std::logic_error(violation.sentence); });
+    const BsplineMap map = ground(7);
+    const std::vector<double> z(small.size(), 0.0);
+    PatchScratch scratch;
+    Gaussian<Vector<5>> belief = prior(1);
+    const PatchNoise of_more(0.01, PatchShape{6, 7, 6}, 0.01, 0.15, 1.0, 1.0);
+    CHECK_THROWS_AS(static_cast<void>(
+                        PatchFilter{}.update(belief, AlongTrackPlacement{}, map, small, z, of_more, scratch)),
+                    std::logic_error);
+    set_violation_handler(previous);
   }
 
   TEST_CASE("patch_filter: a frame that partly leaves the map, or meets voids, uses what it has") {

@@ -24,9 +24,9 @@ template <int N, class S = double>
 class Cholesky {
 public:
   /// Reads the lower triangle of `a`. O(N^3 / 6).
-  explicit Cholesky(const Matrix<N, N, S>& a) : lower_(a) {
+  explicit Cholesky(const Matrix<N, N, S>& a) : lower_(a), good_(a.rows() == a.cols()) {
     using std::sqrt;
-    const int n = size();
+    const int n = good_ ? size() : 0;
     for (int j = 0; j < n; ++j) {
       const S diagonal = lower_(j, j);
       for (int k = 0; k < j; ++k) {
@@ -42,10 +42,10 @@ public:
       for (int i = j + 1; i < n; ++i) lower_(i, j) *= inverse;
       for (int i = 0; i < j; ++i) lower_(i, j) = S(0);
     }
-    if (!good_) lower_.setConstant(S(std::numeric_limits<double>::quiet_NaN()));
+    if (!good_) lower_.setConstant(lower_.rows(), lower_.rows(), S(std::numeric_limits<double>::quiet_NaN()));
   }
 
-  /// False where the matrix is not finite and positive definite; then all that is asked below is NaN.
+  /// False where the matrix is not square, finite and positive definite; then all that is asked below is NaN.
   [[nodiscard]] bool good() const noexcept { return good_; }
 
   [[nodiscard]] const Matrix<N, N, S>& lower() const noexcept { return lower_; }

@@ -134,6 +134,7 @@ template <class Derived>
 /// Skew-symmetric matrix of w: skew(w) * v = w x v.
 template <class Derived>
 [[nodiscard]] Matrix<3, 3, typename Derived::Scalar> skew(const Eigen::MatrixBase<Derived>& w) {
+  static_assert(Derived::SizeAtCompileTime == 3, "skew() takes a vector of three numbers");
   using Scalar = typename Derived::Scalar;
   Matrix<3, 3, Scalar> result;
   result << Scalar(0), -w(2), w(1), w(2), Scalar(0), -w(0), -w(1), w(0), Scalar(0);

@@ -6,6 +6,9 @@
 ///
 ///   NEES = e^T P^-1 e,  e = local(estimate, truth)        NIS = r^T S^-1 r,  r the innovation
 ///
+/// nees(belief, truth) of filter/gaussian.hpp gives the one, Innovation::nis the other; normalised_squared()
+/// does for errors and covariances from elsewhere.
+///
 /// Both are chi-square distributed with d = dim(e) degrees of freedom when the covariance is right, so a mean
 /// over N independent values lies between the quantiles of chi2(N d) / N (Y. Bar-Shalom, X. Li,
 /// T. Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001, section 5.4). Values of
@@ -20,7 +23,6 @@
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
-#include <cairn/manifold/manifold.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn::inline CAIRN_ABI {
@@ -36,14 +38,6 @@ template <class E, class P>
   const double value = static_cast<double>(factor.whiten(e).squaredNorm());
   if (!std::isfinite(value)) return std::nullopt;
   return value;
-}
-
-/// Normalised estimation error squared of one estimate, its covariance in the tangent space at the estimate;
-/// nothing when the covariance is not positive definite.
-template <Manifold X, class P>
-[[nodiscard]] std::optional<double> nees(const X& truth, const X& estimate,
-                                         const Eigen::MatrixBase<P>& covariance) {
-  return normalised_squared(local(estimate, truth), covariance);
 }
 
 enum class Consistency {

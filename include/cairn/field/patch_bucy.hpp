@@ -34,6 +34,7 @@
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kalman_bucy.hpp>
 #include <cairn/filter/model.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn::inline CAIRN_ABI {
@@ -175,16 +176,19 @@ struct PatchBucy {
 
   /// Integrates the belief from time t to `end`, with frame_at(time) the frame seen then (anything a
   /// span of shape.size() numbers comes from) and `density` the spectral density of the samples' noise
-  /// [unit^2 s]. `accepted`, or the belief as it was: outside, flat or not_finite frames, and
-  /// not_positive_definite when the integration fails.
-  template <ContinuousProcess Motion, FramePlacement Placement, FieldInterpolant Map, class FrameAt>
+  /// [unit^2 s]. `accepted`, or the belief as it was: outside, flat or not_finite frames, sizes that do not
+  /// fit and not_positive_definite when the integration fails.
+  template <class Motion, class Placement, FieldInterpolant Map, class FrameAt>
+    requires(ContinuousProcess<Motion> || detail::explain_sizes<Motion>) &&
+            (FramePlacement<Placement> || detail::explain_placement<Placement>)
   PatchVerdict integrate(Gaussian<typename Placement::State>& belief, const Motion& motion,
                          const typename Motion::Control& control, const Placement& where, const Map& map,
                          const PatchShape& shape, FrameAt&& frame_at, double density, double t, double end,
                          PatchScratch& scratch) const;
 
   /// Takes in one frame of samples with noise of this variance, at an instant.
-  template <FramePlacement Placement, FieldInterpolant Map>
+  template <class Placement, FieldInterpolant Map>
+    requires(FramePlacement<Placement> || detail::explain_placement<Placement>)
   PatchVerdict impulse(Gaussian<typename Placement::State>& belief, const Placement& where, const Map& map,
                        const PatchShape& shape, std::span<const double> z, double variance,
                        PatchScratch& scratch) const {
@@ -194,7 +198,9 @@ struct PatchBucy {
   }
 };
 
-template <ContinuousProcess Motion, FramePlacement Placement, FieldInterpolant Map, class FrameAt>
+template <class Motion, class Placement, FieldInterpolant Map, class FrameAt>
+  requires(ContinuousProcess<Motion> || detail::explain_sizes<Motion>) &&
+          (FramePlacement<Placement> || detail::explain_placement<Placement>)
 PatchVerdict PatchBucy::integrate(Gaussian<typename Placement::State>& belief, const Motion& motion,
                                   const typename Motion::Control& control, const Placement& where,
                                   const Map& map, const PatchShape& shape, FrameAt&& frame_at, double density,
@@ -206,21 +212,27 @@ PatchVerdict PatchBucy::integrate(Gaussian<typename Placement::State>& belief, c
   Packed y;
   if (!detail::pack_belief(belief, y)) return PatchVerdict::not_positive_definite;
   const PatchNoise noise(density);
+  const detail::PlainProcess moved(motion, N, control);
   PatchVerdict verdict = PatchVerdict::accepted;
   const auto slope = [&](double time, const Packed& at, Packed& result) {
     const Vector<N> x = detail::packed_mean<N>(at);
     const Matrix<N> sigma = detail::packed_information<N>(at);
     const Cholesky<N> factor(sigma);
+    auto&& seen = frame_at(time);
+    const std::span<const double> z(seen);
     PatchGram frame;
-    verdict = !all_finite(at) || !factor.good()
-                  ? PatchVerdict::not_positive_definite
-                  : PatchLinearisation{}.gram(map, shape, where.placement(x), frame_at(time), noise, scratch,
-                                              frame);
+    if (z.size() != shape.size())  // an empty one too, which says nothing
+      verdict = PatchVerdict::size_mismatch;
+    else if (!all_finite(at) || !factor.good())
+      verdict = PatchVerdict::not_positive_definite;
+    else
+      verdict = PatchLinearisation{}.gram(map, shape, where.placement(x), z, noise, scratch, frame);
     if (verdict == PatchVerdict::accepted && !all_finite(frame.gradient)) verdict = PatchVerdict::not_finite;
     if (verdict != PatchVerdict::accepted) return false;
-    result = detail::belief_rate<N>(sigma, factor, frame, where.jacobian(x), motion.rate(x, control),
-                                    motion.rate_jacobian(x, control), motion.spectral_density(x, control));
-    return true;
+    result = detail::belief_rate<N>(sigma, factor, frame, detail::plain_copy<6, N, double>(where.jacobian(x)),
+                                    moved.rate(x), moved.rate_jacobian(x), moved.spectral_density(x));
+    if (moved.misfit()) verdict = PatchVerdict::size_mismatch;
+    return verdict == PatchVerdict::accepted;
   };
   const bool arrived =
       detail::dormand_prince(y, t, end, tolerance, most_steps, slope, detail::error_scales<N>) != 0;

@@ -59,13 +59,15 @@ struct PatchFilter {
   }
 
   /// Corrects the belief with frame z (shape.size() numbers), or leaves it as it was.
-  template <FramePlacement Placement, FieldInterpolant Map>
+  template <class Placement, FieldInterpolant Map>
+    requires(FramePlacement<Placement> || detail::explain_placement<Placement>)
   [[nodiscard]] PatchUpdate update(Gaussian<typename Placement::State>& belief, const Placement& where,
                                    const Map& map, const PatchShape& shape, std::span<const double> z,
                                    const PatchNoise& noise, PatchScratch& scratch) const;
 
   /// H^T C^-1 H at a state: what the frame can tell, for the Cramer-Rao bound. Nothing when flat or outside.
-  template <FramePlacement Placement, FieldInterpolant Map>
+  template <class Placement, FieldInterpolant Map>
+    requires(FramePlacement<Placement> || detail::explain_placement<Placement>)
   [[nodiscard]] std::optional<Matrix<Placement::State::RowsAtCompileTime>> information(
       const typename Placement::State& x, const Placement& where, const Map& map, const PatchShape& shape,
       const PatchNoise& noise, PatchScratch& scratch) const {
@@ -73,7 +75,8 @@ struct PatchFilter {
     if (linearisation().gram(map, shape, where.placement(x), {}, noise, scratch, result) !=
         PatchVerdict::accepted)
       return std::nullopt;
-    const Matrix<6, Placement::State::RowsAtCompileTime> J = where.jacobian(x);
+    constexpr int n = Placement::State::RowsAtCompileTime;
+    const Matrix<6, n> J = detail::plain_copy<6, n, double>(where.jacobian(x));
     return result.information_by(J);
   }
 
@@ -84,7 +87,8 @@ private:
                 const Linearise& linearise, Vector<N>& u, Matrix<N>& A, PatchUpdate& result) const;
 };
 
-template <FramePlacement Placement, FieldInterpolant Map>
+template <class Placement, FieldInterpolant Map>
+  requires(FramePlacement<Placement> || detail::explain_placement<Placement>)
 PatchUpdate PatchFilter::update(Gaussian<typename Placement::State>& belief, const Placement& where,
                                 const Map& map, const PatchShape& shape, std::span<const double> z,
                                 const PatchNoise& noise, PatchScratch& scratch) const {
@@ -139,7 +143,7 @@ void PatchFilter::minimise(const typename Placement::State& mean, const Matrix<N
     if (!result.accepted()) return;
     least = cost;
     best = u;
-    const Matrix<6, N> J = product(Matrix<6, N>(where.jacobian(x)), L);
+    const Matrix<6, N> J = product(detail::plain_copy<6, N, double>(where.jacobian(x)), L);
     A = frame.information_by(J);
     result.samples = frame.samples;
     result.residual = frame.squares / static_cast<double>(frame.samples);

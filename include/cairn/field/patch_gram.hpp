@@ -30,6 +30,7 @@ enum class [[nodiscard]] PatchVerdict {
   gated,                  ///< the residuals that are left are larger than the noise allows
   not_finite,             ///< NaN or infinity in the frame or the belief
   not_positive_definite,  ///< the belief's covariance
+  size_mismatch,  ///< the frame has not one number a sample, or the motion's run-time sizes do not fit
 };
 
 /// Memory that updates reuse. One per thread.
@@ -63,12 +64,14 @@ struct PatchLinearisation {
   bool free_gain = false;       ///< eliminate an unknown gain (and the bias with it)
   double smallest_share = 0.5;  ///< of the samples that must lie inside the map
 
-  /// The frame's Gram matrix at a placement, or why there is none: outside or flat. z may be empty when only
-  /// the information is wanted (the gradient is then that of a perfect frame: zero). O(samples).
+  /// The frame's Gram matrix at a placement, or why there is none: outside, flat or of another size than the
+  /// shape. z may be empty when only the information is wanted (the gradient is then that of a perfect frame:
+  /// zero). O(samples).
   template <FieldInterpolant Map>
   PatchVerdict gram(const Map& map, const PatchShape& shape, const PatchPlacement& at,
                     std::span<const double> z, const PatchNoise& noise, PatchScratch& scratch,
                     PatchGram& result) const {
+    if (!z.empty() && z.size() != shape.size()) return PatchVerdict::size_mismatch;
     PatchSamples& f = scratch.samples;
     sample_patch(map, shape, at, f);
     result.samples = f.count_inside;

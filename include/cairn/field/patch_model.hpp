@@ -21,20 +21,65 @@
 #include <concepts>
 #include <limits>
 #include <optional>
+#include <type_traits>
+#include <utility>
 
 #include <cairn/core/linalg.hpp>
 #include <cairn/field/patch.hpp>
+#include <cairn/filter/explain_sizes.hpp>
+#include <cairn/filter/matrix_of.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn::inline CAIRN_ABI {
 
-/// A state that says where the frame lies, and how that changes with the state.
+namespace detail {
+
+/// Stands for a matrix of 6 x N whose sizes are fixed.
+template <class A, int N>
+concept PlacementJacobian = MatrixOf<A, 6, N> && ShapeOf<std::remove_cvref_t<A>>::rows == 6 &&
+                            ShapeOf<std::remove_cvref_t<A>>::columns == N;
+
+}  // namespace detail
+
+/// A state (a vector of fixed size) that says where the frame lies, and how that changes with the state.
 template <class P>
 concept FramePlacement = requires(const P& p, const typename P::State& x) {
   { p.placement(x) } -> std::convertible_to<PatchPlacement>;
-  { p.jacobian(x) } -> std::convertible_to<Matrix<6, P::State::RowsAtCompileTime>>;
+  { p.jacobian(x) } -> detail::PlacementJacobian<P::State::RowsAtCompileTime>;
 };
+
+namespace detail {
+
+template <class A, class B>
+inline constexpr bool same_fixed_size = false;
+template <int R, int C, class S>
+inline constexpr bool same_fixed_size<Expected<R, C, S>, Found<R, C, S>> = true;
+
+template <class Expected, class Found>
+struct JacobianOfPlacementHas {
+  static_assert(
+      same_fixed_size<Expected, Found>,
+      "cairn: jacobian(x) of a placement maps steps of its State to the six numbers of a placement, "
+      "its sizes fixed; Expected<rows, columns, number type> and Found<...> say what it has to be "
+      "and what it is");
+};
+
+/// False, for a FramePlacement that is; or the sentence about the size that is wrong.
+template <class P>
+inline constexpr bool explain_placement = [] {
+  if constexpr (requires(const P& p, const typename P::State& x) { p.jacobian(x); }) {
+    using A = std::remove_cvref_t<decltype(std::declval<const P&>().jacobian(
+        std::declval<const typename P::State&>()))>;
+    if constexpr (requires { typename FoundIn<A>; })
+      if constexpr (!PlacementJacobian<A, P::State::RowsAtCompileTime>)
+        static_cast<void>(
+            sizeof(JacobianOfPlacementHas<Expected<6, P::State::RowsAtCompileTime, double>, FoundIn<A>>));
+  }
+  return false;
+}();
+
+}  // namespace detail
 
 /// Spectral densities of the white noises that drive the states; zero for constants.
 struct TrackNoise {
@@ -188,7 +233,8 @@ struct PlanarPlacement {
 /// A frame as a measurement of filter/: one number a sample, white noise. A sample outside the map predicts
 /// NaN, which those filters refuse (Status::not_finite) without touching the belief; PatchFilter drops such
 /// samples instead. Their update costs O(q^3) for q samples: for small frames and for comparison.
-template <FramePlacement Placement, FieldInterpolant Map>
+template <class Placement, FieldInterpolant Map>
+  requires(FramePlacement<Placement> || detail::explain_placement<Placement>)
 struct PatchSensor {
   using State = typename Placement::State;
   using Measurement = Vector<dynamic>;
@@ -210,7 +256,7 @@ struct PatchSensor {
     PatchSamples f;
     sample_patch(*map, shape, where.placement(x), f);
     constexpr int n = State::RowsAtCompileTime;
-    const Matrix<6, n> J = where.jacobian(x);
+    const Matrix<6, n> J = detail::plain_copy<6, n, double>(where.jacobian(x));
     Matrix<dynamic, n> H(static_cast<Eigen::Index>(shape.size()), n);
     for (std::size_t i = 0; i < shape.size(); ++i) {
       const double a = shape.a(i), b = shape.b(i), fx = f.dx[i], fy = f.dy[i];

@@ -119,6 +119,8 @@ public:
   [[nodiscard]] Matrix<K> weigh(const Matrix<dynamic, K>& columns, bool complete = true) const {
     Matrix<K> result = Matrix<K>::Zero();
     detail::add_squares(columns, result);
+    CAIRN_EXPECTS(white() || columns.rows() == along_.cols() * across_.rows(),
+                  "PatchNoise: a correlated noise weighs frames of the shape it was made for");
     if (!white() && complete) subtract_modes(columns, result);
     const double weight = 1.0 / (complete ? variance_ : bound_);
     for (int j = 0; j < K; ++j)

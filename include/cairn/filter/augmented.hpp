@@ -23,6 +23,7 @@
 #include <cairn/filter/driven.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/sigma_points.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/filter/unscented.hpp>
@@ -119,76 +120,87 @@ struct AugmentedUnscented {
 
   /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite, a P or Q that is no
   /// covariance.
-  template <class F>
-    requires AnyProcess<F>
-  Status predict(Gaussian<typename F::State>& belief, const F& process, const typename F::Control& control,
-                 double dt) const {
+  template <class F, class U = typename F::Control>
+    requires(AnyProcess<F> || detail::explain_sizes<F>)
+  Status predict(Gaussian<typename F::State>& belief, const F& process, const U& control, double dt) const {
     using S = ScalarOf<typename F::State>;
     S c(0);
-    const auto pairs = propagated<F>(belief, process, control, dt, 0, c);
+    const int n = detail::common_size(belief.mean, belief.covariance);
+    const auto pairs = propagated(belief, detail::PlainProcess(process, n, control), dt, 0, c);
     if (pairs.status != Status::accepted) return pairs.status;
     return keep(belief, pairs.points, c);
   }
   template <class F>
-    requires AnyProcess<F> && std::same_as<typename F::Control, NoControl>
+    requires(AnyProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
   Status predict(Gaussian<typename F::State>& belief, const F& process, double dt) const {
     return predict(belief, process, NoControl{}, dt);
   }
 
   /// Takes in the measurement z, or refuses it and leaves the belief as it was.
-  template <class H>
-    requires AnyMeasurement<H>
+  template <class H, class T = typename H::Measurement>
+    requires(AnyMeasurement<H> || detail::explain_sizes<H>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
-      Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
+      Gaussian<typename H::State>& belief, const H& sensor, const T& z) const {
     using X = typename H::State;
     using S = ScalarOf<X>;
     using V = typename detail::NoiseOfSensor<H>::type;
     constexpr int n = dof<X>;
     constexpr int k = detail::size_sum<n, dof<V>>;
-    const int size = dof_of(belief.mean);
-    CovarianceOf<V> r = sensor.noise(belief.mean), root_r = r;
+    const int size = detail::common_size(belief.mean, belief.covariance);
+    const detail::PlainSensor plain(sensor, size, z);
+    if (plain.misfit()) return detail::misfitting(plain);
+    CovarianceOf<V> r = detail::dense_of(plain.noise(belief.mean)), root_r = r;
+    if (plain.misfit()) return detail::misfitting(plain);
     CovarianceOf<X> root = belief.covariance;
     const int count = size + static_cast<int>(r.rows());
     S c(0);
-    Status status = belief.covariance.rows() == size ? spread(count, c) : Status::size_mismatch;
+    Status status = spread(count, c);
     if (status == Status::accepted) status = roots<X, V>(belief.covariance, root, r, root_r);
-    if (status != Status::accepted) return refused<H>(sensor, belief, z, status);
+    if (status != Status::accepted) return refused(plain, belief, status);
     detail::PointPairs<X, k> prior(belief.mean, count);
     for (int i = 0; i < size; ++i) prior.odd.col(i) = c * root.col(i);
-    return fuse<H, k>(belief, prior, size, sensor, z, root_r, c);
+    return fuse<k>(belief, prior, size, plain, root_r, c);
   }
 
   /// One predict and one update with points drawn once. Refused: as either of them; the belief then stays
   /// where it was before the prediction. No point carries stabilising noise: it has to be zero here.
-  template <class F, class H>
-    requires AnyProcess<F> && AnyMeasurement<H> && std::same_as<typename F::State, typename H::State>
+  template <class F, class H, class U = typename F::Control, class T = typename H::Measurement>
+    requires(AnyProcess<F> || detail::explain_sizes<F>) && (AnyMeasurement<H> || detail::explain_sizes<H>) &&
+            std::same_as<typename F::State, typename H::State>
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> step(
-      Gaussian<typename H::State>& belief, const F& process, const typename F::Control& control, double dt,
-      const H& sensor, const typename H::Measurement& z) const {
+      Gaussian<typename H::State>& belief, const F& process, const U& control, double dt, const H& sensor,
+      const T& z) const {
     using X = typename H::State;
     using S = ScalarOf<X>;
     using W = typename detail::NoiseOfProcess<F>::type;
     using V = typename detail::NoiseOfSensor<H>::type;
     constexpr int moved = detail::size_sum<dof<X>, dof<W>>;
     constexpr int k = detail::size_sum<moved, dof<V>>;
-    CovarianceOf<V> r = sensor.noise(belief.mean);
+    const int size = detail::common_size(belief.mean, belief.covariance);
+    const detail::PlainSensor plain(sensor, size, z);
+    if (plain.misfit()) return detail::misfitting(plain);
+    CovarianceOf<V> r = detail::dense_of(plain.noise(belief.mean));
+    if (plain.misfit()) return detail::misfitting(plain);
     S c(0);
-    const auto predicted = propagated<F>(belief, process, control, dt, static_cast<int>(r.rows()), c);
+    const auto predicted =
+        propagated(belief, detail::PlainProcess(process, size, control), dt, static_cast<int>(r.rows()), c);
     const int count = static_cast<int>(predicted.points.odd.cols());
     Gaussian<X> next = belief;
     Status status = stabilising_noise == 0.0 ? predicted.status : Status::bad_option;
     if (status == Status::accepted) status = keep(next, predicted.points, c);
     CovarianceOf<V> root_r = r;
     if (status == Status::accepted) {
-      r = sensor.noise(predicted.points.center);
+      const Eigen::Index numbers = r.rows();
+      r = detail::dense_of(plain.noise(predicted.points.center));
+      if (plain.misfit() || r.rows() != numbers) return detail::misfitting(plain);
       status = noise_root<V>(r, root_r);
     }
-    if (status != Status::accepted) return refused<H>(sensor, belief, z, status);
+    if (status != Status::accepted) return refused(plain, belief, status);
     detail::PointPairs<X, k> prior(predicted.points.center, count + static_cast<int>(r.rows()));
     prior.odd.leftCols(count) = predicted.points.odd;
     prior.even.leftCols(count) = predicted.points.even;
     prior.shift = predicted.points.shift;
-    auto innovation = fuse<H, k>(next, prior, count, sensor, z, root_r, c);
+    auto innovation = fuse<k>(next, prior, count, plain, root_r, c);
     if (innovation.accepted()) belief = next;
     return innovation;
   }
@@ -234,39 +246,40 @@ private:
   }
 
   /// The points of (x, w) after the motion; `further` numbers of noise are still to come.
-  template <class F>
-  auto propagated(const Gaussian<typename F::State>& belief, const F& process,
-                  const typename F::Control& control, double dt, int further,
-                  ScalarOf<typename F::State>& c) const {
+  template <class F, class U>
+  auto propagated(const Gaussian<typename F::State>& belief, const detail::PlainProcess<F, U>& process,
+                  double dt, int further, ScalarOf<typename F::State>& c) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
     using W = typename detail::NoiseOfProcess<F>::type;
     constexpr int k = detail::size_sum<dof<X>, dof<W>>;
     const int n = dof_of(belief.mean);
-    const CovarianceOf<W> q = process.noise(belief.mean, control, dt);
+    const CovarianceOf<W> q = detail::dense_of(process.noise(belief.mean, dt));
+    if (process.misfit()) return Propagated<X, k>{{belief.mean, k == dynamic ? 0 : k}, Status::size_mismatch};
     const int count = n + static_cast<int>(q.rows());
     Tangent<W> w = Tangent<W>::Zero(q.rows());
-    Propagated<X, k> out{{detail::driven(process, belief.mean, control, w, dt), count}, Status::accepted};
+    Propagated<X, k> out{{process.driven(belief.mean, w, dt), count}, Status::accepted};
     CovarianceOf<X> root = belief.covariance;
     CovarianceOf<W> root_q = q;
     out.status = spread(count + further, c);
     if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) out.status = Status::bad_time_step;
-    if (belief.covariance.rows() != n) out.status = Status::size_mismatch;
+    if (process.misfit()) out.status = Status::size_mismatch;
     if (out.status == Status::accepted) out.status = roots<X, W>(belief.covariance, root, q, root_q);
     if (out.status != Status::accepted) return out;
     using std::sqrt;
     const S wider = c * sqrt(static_cast<S>(fading));
     for (int i = 0; i < n; ++i) {
       const Tangent<X> d = wider * root.col(i);
-      out.points.set(i, detail::driven(process, retract(belief.mean, d), control, w, dt),
-                     detail::driven(process, retract(belief.mean, Tangent<X>(-d)), control, w, dt));
+      out.points.set(i, process.driven(retract(belief.mean, d), w, dt),
+                     process.driven(retract(belief.mean, Tangent<X>(-d)), w, dt));
     }
     for (int i = n; i < count; ++i) {
       w = c * root_q.col(i - n);
-      const X up = detail::driven(process, belief.mean, control, w, dt);
+      const X up = process.driven(belief.mean, w, dt);
       w = -w;
-      out.points.set(i, up, detail::driven(process, belief.mean, control, w, dt));
+      out.points.set(i, up, process.driven(belief.mean, w, dt));
     }
+    if (process.misfit()) out.status = Status::size_mismatch;
     out.points.shift /= c * c;
     return out;
   }
@@ -287,9 +300,9 @@ private:
   }
 
   /// The first `count` pairs of `prior` and the noise's own through the sensor, and the update.
-  template <class H, int K>
+  template <int K, class H, class T>
   auto fuse(Gaussian<typename H::State>& belief, const detail::PointPairs<typename H::State, K>& prior,
-            int count, const H& sensor, const typename H::Measurement& z,
+            int count, const detail::PlainSensor<H, T>& sensor,
             const CovarianceOf<typename detail::NoiseOfSensor<H>::type>& root_r,
             const ScalarOf<typename H::State>& c) const {
     using X = typename H::State;
@@ -298,19 +311,20 @@ private:
     using V = typename detail::NoiseOfSensor<H>::type;
     Tangent<V> v = Tangent<V>::Zero(root_r.rows());
     const int all = count + static_cast<int>(root_r.rows());
-    detail::PointPairs<Z, K> seen(detail::sensed(sensor, prior.center, v), all);
+    detail::PointPairs<Z, K> seen(sensor.driven(prior.center, v), all);
     for (int i = 0; i < count; ++i)
-      seen.set(i, detail::sensed(sensor, prior.up(i), v), detail::sensed(sensor, prior.down(i), v));
+      seen.set(i, sensor.driven(prior.up(i), v), sensor.driven(prior.down(i), v));
     for (int i = count; i < all; ++i) {
       v = c * root_r.col(i - count);
-      const Z up = detail::sensed(sensor, prior.center, v);
+      const Z up = sensor.driven(prior.center, v);
       v = -v;
-      seen.set(i, up, detail::sensed(sensor, prior.center, v));
+      seen.set(i, up, sensor.driven(prior.center, v));
     }
+    if (sensor.misfit()) return detail::misfitting(sensor);
     constexpr int n = dof<X>, m = dof<Z>;
     const S w = S(1) / (c * c);
     seen.shift *= w;
-    auto in = detail::fresh_innovation<m, S>(local(seen.mean(), z), seen.covariance(w, extra<S>()));
+    auto in = detail::fresh_innovation<m, S>(local(seen.mean(), sensor.z()), seen.covariance(w, extra<S>()));
     const Matrix<n, m, S> cross = prior.moment(seen, w, extra<S>());
     const S digits =
         detail::digits_of_points(belief.mean, belief.covariance, seen.center, in.covariance);
@@ -343,17 +357,18 @@ private:
     return in;
   }
 
-  template <class H>
-  static auto refused(const H& sensor, const Gaussian<typename H::State>& belief,
-                      const typename H::Measurement& z, Status status) {
+  template <class H, class T>
+  static auto refused(const detail::PlainSensor<H, T>& sensor, const Gaussian<typename H::State>& belief,
+                      Status status) {
     using Z = typename H::Measurement;
     using V = typename detail::NoiseOfSensor<H>::type;
-    const V none = Tangent<V>::Zero(sensor.noise(belief.mean).rows());
-    const Tangent<Z> residual = local(Z(detail::sensed(sensor, belief.mean, none)), z);
-    const int m = static_cast<int>(residual.size());
-    auto in = detail::fresh_innovation<dof<Z>, ScalarOf<Z>>(residual, CovarianceOf<Z>::Zero(m, m));
-    in.status = status;
-    return in;
+    auto innovation = detail::misfitting(sensor);
+    innovation.status = status;
+    if (status == Status::size_mismatch) return innovation;
+    const Tangent<V> none = Tangent<V>::Zero(sensor.noise(belief.mean).rows());
+    const Z seen = sensor.driven(belief.mean, none);
+    if (!sensor.misfit()) innovation.residual = local(seen, sensor.z());
+    return innovation;
   }
 };
 

@@ -23,6 +23,7 @@
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kernels.hpp>
 #include <cairn/filter/status.hpp>
+#include <cairn/filter/matrix_of.hpp>
 #include <cairn/filter/structure.hpp>
 #include <cairn/version.hpp>
 
@@ -103,9 +104,12 @@ struct BatchKalman {
   double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
 
   /// Adds the process noise Q to every belief: states that stand still but for a random walk. Refused, and
-  /// nothing changed: a Q that is no covariance. O(size).
-  template <int N, class S>
-  Status drift(GaussianBatch<N, S>& batch, const Matrix<N, N, S>& q) const {
+  /// nothing changed: a Q that is no covariance or of another run-time size. O(size).
+  template <int N, class S, MatrixOf<N, N, S> Q>
+  Status drift(GaussianBatch<N, S>& batch, const Q& noise) const {
+    bool misfit = false;
+    const Matrix<N, N, S> q = detail::plain_matrix<N, N, S>(noise, N, N, misfit);
+    if (misfit) return Status::size_mismatch;
     if (const Status status = detail::judge_noise<N, S>(q); status != Status::accepted) return status;
     for (auto& block : batch.blocks())
       for (int i = 0; i < N; ++i)
@@ -113,10 +117,10 @@ struct BatchKalman {
     return Status::accepted;
   }
 
-  /// x <- F x, P <- F P F^T + Q for every belief, the same F (a Matrix or Structured) and Q. Refused, and
-  /// nothing changed: a Q that is no covariance, an F that is not finite.
-  template <int N, class S, class F>
-  Status predict(GaussianBatch<N, S>& batch, const F& f, const Matrix<N, N, S>& q) const;
+  /// x <- F x, P <- F P F^T + Q for every belief, the same F and Q (anything that stands for a matrix).
+  /// Refused, and nothing changed: another run-time size, a Q that is no covariance, an F that is not finite.
+  template <int N, class S, MatrixOf<N, N, S> F, MatrixOf<N, N, S> Q>
+  Status predict(GaussianBatch<N, S>& batch, const F& f, const Q& noise) const;
 
   /// Belief i takes in measurement i = N(z_i, R_i) of all its states (H = I). Returns how many were kept;
   /// `kept`, where given, gets a 1 or 0 for each. Throws Error where the sizes differ. A lane whose numbers
@@ -124,6 +128,7 @@ struct BatchKalman {
   template <int N, class S>
   std::size_t update(GaussianBatch<N, S>& batch, const GaussianBatch<N, S>& seen,
                      std::span<std::uint8_t> kept = {}) const;
+
 };
 
 namespace detail {
@@ -233,11 +238,14 @@ std::size_t BatchKalman::update(GaussianBatch<N, S>& batch, const GaussianBatch<
   return count;
 }
 
-template <int N, class S, class F>
-Status BatchKalman::predict(GaussianBatch<N, S>& batch, const F& f, const Matrix<N, N, S>& q) const {
+template <int N, class S, MatrixOf<N, N, S> F, MatrixOf<N, N, S> Q>
+Status BatchKalman::predict(GaussianBatch<N, S>& batch, const F& f, const Q& noise) const {
   using Batch = GaussianBatch<N, S>;
   using Lane = typename Batch::Lane;
-  const Matrix<N, N, S> a = detail::dense_of(f);
+  bool misfit = false;
+  const Matrix<N, N, S> a = detail::plain_matrix<N, N, S>(f, N, N, misfit);
+  const Matrix<N, N, S> q = detail::plain_matrix<N, N, S>(noise, N, N, misfit);
+  if (misfit) return Status::size_mismatch;
   if (!all_finite(a)) return Status::not_finite;
   if (const Status status = detail::judge_noise<N, S>(q); status != Status::accepted) return status;
   for (auto& block : batch.blocks()) {

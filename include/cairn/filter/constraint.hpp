@@ -12,16 +12,28 @@
 #pragma once
 
 #include <cmath>
+#include <concepts>
 #include <limits>
 
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/array_update.hpp>
 #include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/matrix_of.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn::inline CAIRN_ABI {
+
+namespace detail {
+
+/// Rows of D and numbers of c, as far as one of them knows when it is compiled.
+template <class D, class C>
+inline constexpr int common_rows = ShapeOf<D>::rows != dynamic ? ShapeOf<D>::rows
+                                   : ShapeOf<C>::rows == 1     ? ShapeOf<C>::columns
+                                                               : ShapeOf<C>::rows;
+
+}  // namespace detail
 
 /// Projects the belief onto the K constraints; for vectors D x = b is c = b - D mean. A constraint that repeats
 /// others, or what the belief is certain of, and agrees with them changes nothing. Refused, and the belief left:
@@ -35,8 +47,9 @@ Status constrain(Gaussian<X>& belief, const Matrix<K, dof<X>, ScalarOf<X>>& d,
   using std::sqrt;
   constexpr int n = dof<X>;
   constexpr S digits = detail::digits_left<S>;
+  if (!detail::has_size(d, c.size(), detail::common_size(belief.mean, belief.covariance)) || c.size() == 0)
+    return Status::size_mismatch;
   const int ns = static_cast<int>(belief.covariance.rows()), ks = static_cast<int>(d.rows());
-  if (d.cols() != ns || c.size() != ks) return Status::size_mismatch;
   if (!all_finite(d) || !all_finite(c) || !all_finite(belief.covariance)) return Status::not_finite;
   CovarianceOf<X> root = belief.covariance;
   if (!detail::checked_root<n, S>(belief.covariance, root)) return Status::not_positive_definite;
@@ -123,6 +136,23 @@ Status constrain(Gaussian<X>& belief, const Matrix<K, dof<X>, ScalarOf<X>>& d,
   belief.mean = retract(belief.mean, step);
   belief.covariance = detail::squared_root<n, S>(free);
   return Status::accepted;
+}
+
+/// The same for anything that stands for D and c.
+template <Manifold X, class D, class C>
+  requires(!std::same_as<D, Matrix<detail::common_rows<D, C>, dof<X>, ScalarOf<X>>> ||
+           !std::same_as<C, Vector<detail::common_rows<D, C>, ScalarOf<X>>>) &&
+          MatrixOf<D, detail::common_rows<D, C>, dof<X>, ScalarOf<X>> &&
+          VectorOf<C, detail::common_rows<D, C>, ScalarOf<X>>
+Status constrain(Gaussian<X>& belief, const D& d, const C& c) {
+  using S = ScalarOf<X>;
+  constexpr int k = detail::common_rows<D, C>;
+  bool misfit = false;
+  const Eigen::Index rows = k != dynamic ? k : d.rows();
+  const int n = detail::common_size(belief.mean, belief.covariance);
+  const Matrix<k, dof<X>, S> plain_d = detail::plain_matrix<k, dof<X>, S>(d, rows, n, misfit);
+  const Vector<k, S> plain_c = detail::plain_vector<Vector<k, S>>(c, rows, misfit);
+  return misfit ? Status::size_mismatch : constrain(belief, plain_d, plain_c);
 }
 
 }  // namespace cairn::inline CAIRN_ABI

@@ -27,6 +27,7 @@
 #include <cairn/filter/elimination.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kernels.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
@@ -406,6 +407,37 @@ Status advance(Gaussian<X>& belief, const X& mean, const F& f, const CovarianceO
   belief.mean = mean;
   belief.covariance = next;
   return Status::accepted;
+}
+
+/// The prediction by a process's Jacobian.
+template <class F, class U>
+[[gnu::always_inline]] inline Status predict_linearised(Gaussian<typename F::State>& belief, const F& model,
+                                                        const U& control, double dt, double fading,
+                                                        double extra) {
+  if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
+  if (!(fading >= 1.0) || !(extra >= 0.0)) return Status::bad_option;
+  const PlainProcess process(model, common_size(belief.mean, belief.covariance), control);
+  decltype(auto) f = process.jacobian(belief.mean, dt);
+  decltype(auto) q = process.noise(belief.mean, dt);
+  if (process.misfit()) return Status::size_mismatch;
+  decltype(auto) mean = process.propagate(belief.mean, dt);
+  if (process.misfit()) return Status::size_mismatch;
+  return advance(belief, mean, f, q, fading, extra);
+}
+
+/// The update by a sensor's Jacobian.
+template <class H, class V>
+[[gnu::always_inline]] inline auto update_linearised(Gaussian<typename H::State>& belief,
+                                                     const PlainSensor<H, V>& sensor, double gate,
+                                                     Form form) {
+  using S = ScalarOf<typename H::State>;
+  constexpr int m = dof<typename H::Measurement>;
+  decltype(auto) h = sensor.jacobian(belief.mean);
+  decltype(auto) noise = sensor.noise(belief.mean);
+  if (sensor.misfit()) return misfitting(sensor);
+  const Vector<m, S> residual = sensor.residual(belief.mean);
+  if (sensor.misfit()) return misfitting(sensor);
+  return correct<typename H::State, m>(belief, h, dense_of(noise), residual, gate, form);
 }
 
 }  // namespace detail

@@ -35,8 +35,8 @@ template <class F>
 concept DrivenProcess = Manifold<typename F::State> && Manifold<typename F::Noise> &&
                         requires(const F& f, const typename F::State& x, const typename F::Control& u,
                                  const typename F::Noise& w, double dt) {
-                          { f.propagate(x, u, w, dt) } -> std::convertible_to<typename F::State>;
-                          { f.noise(x, u, dt) } -> std::convertible_to<CovarianceOf<typename F::Noise>>;
+                          { f.propagate(x, u, w, dt) } -> StateOf<typename F::State>;
+                          { f.noise(x, u, dt) } -> detail::CovarianceLike<typename F::Noise>;
                         };
 
 /// A sensor that says how its noise enters: predict(x, v), v ~ N(0, noise(x)), a vector.
@@ -44,8 +44,8 @@ template <class H>
 concept DrivenMeasurement =
     Manifold<typename H::State> && Manifold<typename H::Measurement> && Manifold<typename H::Noise> &&
     requires(const H& h, const typename H::State& x, const typename H::Noise& v) {
-      { h.predict(x, v) } -> std::convertible_to<typename H::Measurement>;
-      { h.noise(x) } -> std::convertible_to<CovarianceOf<typename H::Noise>>;
+      { h.predict(x, v) } -> StateOf<typename H::Measurement>;
+      { h.noise(x) } -> detail::CovarianceLike<typename H::Noise>;
     };
 
 namespace detail {
@@ -66,23 +66,6 @@ template <DrivenMeasurement H>
 struct NoiseOfSensor<H> {
   using type = typename H::Noise;
 };
-
-/// The motion with its noise, however that enters.
-template <class F, class W>
-[[nodiscard]] typename F::State driven(const F& f, const typename F::State& x, const typename F::Control& u,
-                                       const W& w, double dt) {
-  if constexpr (DrivenProcess<F>)
-    return f.propagate(x, u, w, dt);
-  else
-    return retract(typename F::State(f.propagate(x, u, dt)), w);
-}
-template <class H, class V>
-[[nodiscard]] typename H::Measurement sensed(const H& h, const typename H::State& x, const V& v) {
-  if constexpr (DrivenMeasurement<H>)
-    return h.predict(x, v);
-  else
-    return retract(typename H::Measurement(h.predict(x)), v);
-}
 
 }  // namespace detail
 

@@ -30,6 +30,7 @@
 #include <cairn/filter/driven.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
@@ -55,6 +56,7 @@ struct Ensemble {
   /// Mean, by two rounds of tangent averaging from the first member.
   [[nodiscard]] X mean() const {
     CAIRN_EXPECTS(!members.empty(), "the mean of an ensemble needs at least one member");
+    CAIRN_EXPECTS(detail::common_size(members) > 0, "the members of an ensemble have one size");
     X center = members.front();
     for (int round = 0; round < 2; ++round) {
       Tangent<X> shift = Tangent<X>::Zero(dof_of(center));
@@ -83,9 +85,10 @@ struct EnsembleKalman {
   double inflation = 1.0;  ///< distances from the mean are multiplied by this before an update; >= 1
 
   /// Moves every member by dt and a draw of the noise.
-  template <AnyProcess F>
-  Status predict(Ensemble<typename F::State>& belief, const F& process, const typename F::Control& control,
-                 double dt, Random& random) const {
+  template <class F, class U = typename F::Control>
+    requires(AnyProcess<F> || detail::explain_sizes<F>)
+  Status predict(Ensemble<typename F::State>& belief, const F& process, const U& control, double dt,
+                 Random& random) const {
     using X = typename F::State;
     using W = typename detail::NoiseOfProcess<F>::type;
     using S = ScalarOf<X>;
@@ -93,12 +96,16 @@ struct EnsembleKalman {
     if (belief.size() < 2) return Status::depleted;
     Ensemble<X> next;
     next.members.reserve(belief.size());
+    const detail::PlainProcess plain(process, detail::common_size(belief.members), control);
+    if (plain.misfit()) return Status::size_mismatch;
     for (const X& x : belief.members) {
-      const CovarianceOf<W> q = process.noise(x, control, dt);
+      const CovarianceOf<W> q = detail::dense_of(plain.noise(x, dt));
+      if (plain.misfit()) return Status::size_mismatch;
       CovarianceOf<W> root = q;
       if (!all_finite(q)) return Status::not_finite;
       if (!detail::checked_root<dof<W>, S>(q, root)) return Status::not_positive_definite;
-      next.members.push_back(detail::driven(process, x, control, draw<W>(root, random), dt));
+      next.members.push_back(plain.driven(x, draw<W>(root, random), dt));
+      if (plain.misfit()) return Status::size_mismatch;
       if (!detail::finite_state(next.members.back())) return Status::not_finite;
     }
     belief = std::move(next);
@@ -107,10 +114,10 @@ struct EnsembleKalman {
 
   /// Takes in z, or refuses it and leaves every member; the noise is that at the mean. `random` is drawn from
   /// by the perturbed form alone. O(N m (n + m)).
-  template <MeasurementModel H>
+  template <class H, class V = typename H::Measurement>
+    requires(MeasurementModel<H> || detail::explain_sizes<H>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
-      Ensemble<typename H::State>& belief, const H& sensor, const typename H::Measurement& z,
-      Random& random) const {
+      Ensemble<typename H::State>& belief, const H& sensor, const V& z, Random& random) const {
     using X = typename H::State;
     using Z = typename H::Measurement;
     using S = ScalarOf<X>;
@@ -118,20 +125,23 @@ struct EnsembleKalman {
     const int count = static_cast<int>(belief.size());
     if (count < 2) return refused<m, S>(Status::depleted);
     if (!(gate > 0.0) || !(inflation >= 1.0)) return refused<m, S>(Status::bad_option);
+    const detail::PlainSensor plain(sensor, detail::common_size(belief.members), z);
+    if (plain.misfit()) return detail::misfitting(plain);
     const X center = belief.mean();
     if (!detail::finite_state(center)) return refused<m, S>(Status::not_finite);
     Matrix<dof<X>, dynamic, S> apart(dof_of(center), count);
     Ensemble<Z> seen;
     for (int i = 0; i < count; ++i) {
       apart.col(i) = static_cast<S>(inflation) * local(center, belief.members[static_cast<std::size_t>(i)]);
-      seen.members.push_back(sensor.predict(retract(center, Tangent<X>(apart.col(i)))));
+      seen.members.push_back(plain.predict(retract(center, Tangent<X>(apart.col(i)))));
     }
+    const Matrix<m, m, S> r = detail::dense_of(plain.noise(center));
+    if (plain.misfit()) return detail::misfitting(plain);
     const Z expected = seen.mean();
     Matrix<m, dynamic, S> views(dof_of(expected), count);
     for (int i = 0; i < count; ++i) views.col(i) = local(expected, seen.members[static_cast<std::size_t>(i)]);
-    const Matrix<m, m, S> r = sensor.noise(center);
     const Matrix<m, m, S> spread = views * views.transpose() / static_cast<S>(count - 1);
-    auto in = detail::fresh_innovation<m, S>(local(expected, z), symmetrised(spread + r));
+    auto in = detail::fresh_innovation<m, S>(local(expected, plain.z()), symmetrised(spread + r));
     in.nis = detail::squared_mahalanobis<m, S>(in.residual, in.covariance);
     Matrix<m, m, S> root = r;
     in.status = judge<m, S>(in, r, root);

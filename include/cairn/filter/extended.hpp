@@ -42,17 +42,13 @@ struct Extended {
   double settled = 1e-3;           ///< refused as not_converged where they end with a larger change
 
   /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite.
-  template <LinearisedProcess F>
-  Status predict(Gaussian<typename F::State>& belief, const F& process, const typename F::Control& control,
-                 double dt) const {
-    if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
-    if (!(fading >= 1.0) || !(stabilising_noise >= 0.0)) return Status::bad_option;
-    return detail::advance(belief, process.propagate(belief.mean, control, dt),
-                           process.jacobian(belief.mean, control, dt),
-                           process.noise(belief.mean, control, dt), fading, stabilising_noise);
+  template <class F, class U = typename F::Control>
+    requires(LinearisedProcess<F> || detail::explain_sizes<F>)
+  Status predict(Gaussian<typename F::State>& belief, const F& process, const U& control, double dt) const {
+    return detail::predict_linearised(belief, process, control, dt, fading, stabilising_noise);
   }
-  template <LinearisedProcess F>
-    requires std::same_as<typename F::Control, NoControl>
+  template <class F>
+    requires(LinearisedProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
   Status predict(Gaussian<typename F::State>& belief, const F& process, double dt) const {
     return predict(belief, process, NoControl{}, dt);
   }
@@ -60,28 +56,27 @@ struct Extended {
   /// Takes in the measurement z, or refuses it and leaves the belief as it was. The innovation is the one
   /// before the update, whatever the iterations. Where R is singular there is no cost to compare, and
   /// iterations take full steps.
-  template <LinearisedMeasurement H>
+  template <class H, class V = typename H::Measurement>
+    requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
-      Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
-    using X = typename H::State;
-    constexpr int m = dof<typename H::Measurement>;
-    const auto residual = local(typename H::Measurement(sensor.predict(belief.mean)), z);
+      Gaussian<typename H::State>& belief, const H& sensor, const V& z) const {
+    const detail::PlainSensor plain(sensor, detail::common_size(belief.mean, belief.covariance), z);
     if (iterations == 1) [[likely]]
-      return detail::correct<X, m>(belief, sensor.jacobian(belief.mean),
-                                   detail::dense_of(sensor.noise(belief.mean)), residual, gate, form);
-    Gaussian<X> first = belief;
-    auto innovation =
-        detail::correct<X, m>(first, sensor.jacobian(belief.mean),
-                              detail::dense_of(sensor.noise(belief.mean)), residual, gate, form);
+      return detail::update_linearised(belief, plain, gate, form);
+    Gaussian<typename H::State> first = belief;
+    auto innovation = detail::update_linearised(first, plain, gate, form);
     if (iterations < 1 || !(tolerance >= 0.0) || !(settled >= 0.0)) innovation.status = Status::bad_option;
-    if (innovation.accepted()) innovation.status = iterate(belief, sensor, z);
+    if (!innovation.accepted()) return innovation;
+    first = belief;
+    innovation.status = iterate(first, plain);
+    if (plain.misfit()) innovation.status = Status::size_mismatch;
+    if (innovation.accepted()) belief = first;
     return innovation;
   }
 
 private:
-  template <class H>
-  Status iterate(Gaussian<typename H::State>& belief, const H& sensor,
-                 const typename H::Measurement& z) const;
+  template <class H, class V>
+  Status iterate(Gaussian<typename H::State>& belief, const detail::PlainSensor<H, V>& sensor) const;
 };
 
 namespace detail {
@@ -95,9 +90,9 @@ template <Manifold X>
 
 }  // namespace detail
 
-template <class H>
-Status Extended::iterate(Gaussian<typename H::State>& belief, const H& sensor,
-                         const typename H::Measurement& z) const {
+template <class H, class V>
+Status Extended::iterate(Gaussian<typename H::State>& belief,
+                         const detail::PlainSensor<H, V>& sensor) const {
   using X = typename H::State;
   using Z = typename H::Measurement;
   using S = ScalarOf<X>;
@@ -109,7 +104,7 @@ Status Extended::iterate(Gaussian<typename H::State>& belief, const H& sensor,
   if (!detail::checked_root<n, S>(belief.covariance, root)) return Status::not_positive_definite;
   const int ns = static_cast<int>(root.rows());
   Tangent<X> u = Tangent<X>::Zero(ns), e = u;
-  Vector<m, S> residual = local(Z(sensor.predict(belief.mean)), z);
+  Vector<m, S> residual = sensor.residual(belief.mean);
   const int ms = static_cast<int>(residual.size());
   CovarianceOf<X> updated = root;  // a root of the covariance in the tangent space of the prior
   bool done = false;
@@ -118,7 +113,8 @@ Status Extended::iterate(Gaussian<typename H::State>& belief, const H& sensor,
     const X x = retract(belief.mean, e);
     Matrix<m, n, S> h = detail::dense_of(sensor.jacobian(x));
     if constexpr (!detail::is_vector<X>) h = (h * detail::transport(belief.mean, e)).eval();
-    const Matrix<m, m, S> noise = sensor.noise(x);
+    const Matrix<m, m, S> noise = detail::dense_of(sensor.noise(x));
+    if (sensor.misfit()) return Status::size_mismatch;
     if (!all_finite(h) || !all_finite(noise) || !all_finite(residual)) return Status::not_finite;
     Matrix<m, m, S> root_r = noise, white_r = noise;
     if (!detail::checked_root<m, S>(noise, root_r)) return Status::not_positive_definite;
@@ -169,8 +165,7 @@ Status Extended::iterate(Gaussian<typename H::State>& belief, const H& sensor,
     for (int halving = 0; halving < 40 && !lower; ++halving) {
       const Tangent<X> next = u + change;
       const Tangent<X> next_e = detail::column_product(root, next);
-      const Vector<m, S> next_residual =
-          local(Z(sensor.predict(retract(belief.mean, next_e))), z);
+      const Vector<m, S> next_residual = sensor.residual(retract(belief.mean, next_e));
       lower = done || (has_cost ? cost(next, next_residual) <= enough : all_finite(next_residual));
       if (lower) {
         u = next;

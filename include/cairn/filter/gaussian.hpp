@@ -22,6 +22,17 @@
 
 namespace cairn::inline CAIRN_ABI {
 
+namespace detail {
+
+[[noreturn, gnu::cold, gnu::noinline]] inline void raise_sizes(Eigen::Index numbers, Eigen::Index rows,
+                                                               Eigen::Index columns) {
+  std::string text("Gaussian: expected a mean and a square covariance of the size of the state; found ");
+  text.append(std::to_string(numbers)).append(" numbers, ").append(std::to_string(rows)).append(" x ");
+  raise(text.append(std::to_string(columns)));
+}
+
+}  // namespace detail
+
 /// Truth = retract(mean, d), d ~ N(0, covariance). A plain aggregate; checked() is for numbers from outside.
 template <Manifold X>
 struct Gaussian {
@@ -35,6 +46,21 @@ struct Gaussian {
   /// The belief, after checking that the covariance is finite, symmetric (to 1e-9 of the two standard
   /// deviations, 1e-4 in float) and positive semi-definite and fits the mean. Throws Error naming the entry.
   [[nodiscard]] static Gaussian checked(const X& mean, const Covariance& covariance);
+  /// The same of anything that stands for them: run-time sizes are checked too.
+  template <StateOf<X> M, MatrixOf<dof<X>, dof<X>, Scalar> P>
+  [[nodiscard]] static Gaussian checked(const M& mean, const P& covariance) {
+    bool misfit = false;
+    const int n = dof<X> != dynamic ? dof<X> : static_cast<int>(covariance.rows());
+    const Covariance matrix = detail::plain_matrix<dof<X>, dof<X>, Scalar>(covariance, n, n, misfit);
+    if constexpr (detail::is_vector<X>) {
+      const X center = detail::plain_vector<X>(mean, n, misfit);
+      if (misfit) detail::raise_sizes(mean.size(), covariance.rows(), covariance.cols());
+      return checked(center, matrix);
+    } else {
+      if (misfit) detail::raise_sizes(n, covariance.rows(), covariance.cols());
+      return checked(X(mean), matrix);
+    }
+  }
 };
 
 namespace detail {
@@ -43,11 +69,6 @@ template <class S>
 [[nodiscard]] inline bool finite(const S& value) {
   return value - value == S(0);
 }
-
-template <class X>
-inline constexpr bool is_vector = false;
-template <class S, int N, int O, int MR, int MC>
-inline constexpr bool is_vector<Eigen::Matrix<S, N, 1, O, MR, MC>> = true;
 
 /// Every number of the state is finite. A step from x to itself is zero unless something is not.
 template <Manifold X>
@@ -189,6 +210,8 @@ Gaussian<X> Gaussian<X>::checked(const X& mean, const Covariance& covariance) {
 /// direction without variance, one that exceeds the deviation that the rounding of P may hide.
 template <Manifold X>
 [[nodiscard]] ScalarOf<X> nees(const Gaussian<X>& belief, const X& truth) {
+  CAIRN_EXPECTS(detail::common_size(belief.mean, belief.covariance) == dof_of(truth),
+                "nees needs a covariance and a truth of the mean's size");
   const Tangent<X> d = local(belief.mean, truth);
   return detail::squared_mahalanobis<dof<X>, ScalarOf<X>>(d, belief.covariance);
 }
@@ -196,6 +219,8 @@ template <Manifold X>
 /// A state drawn from the belief, whose covariance may be singular but must be one.
 template <Manifold X>
 [[nodiscard]] X sample(const Gaussian<X>& belief, Random& random) {
+  CAIRN_EXPECTS(detail::common_size(belief.mean, belief.covariance) > 0,
+                "sample needs a covariance of the mean's size");
   Tangent<X> d = manifold_traits<X>::local(belief.mean, belief.mean);
   for (int i = 0; i < static_cast<int>(d.size()); ++i) d(i) = static_cast<ScalarOf<X>>(random.normal());
   CovarianceOf<X> root = belief.covariance;

@@ -29,6 +29,7 @@
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/filter/structure.hpp>
 #include <cairn/version.hpp>
@@ -230,17 +231,19 @@ struct InformationBelief {
     const int n = dof_of(x);
     return {x, CovarianceOf<X>::Zero(n, n), Tangent<X>::Zero(n)};
   }
-  /// The same belief in information form; nothing where the covariance is singular, or so nearly that its
-  /// inverse would not have three digits.
+  /// The same belief in information form; nothing where the covariance is of another size or singular, or so
+  /// nearly that its inverse would not have three digits.
   [[nodiscard]] static std::optional<InformationBelief> from(const Gaussian<X>& belief) {
     using S = ScalarOf<X>;
-    const int n = dof_of(belief.mean);
+    const int n = detail::common_size(belief.mean, belief.covariance);
+    if (n == 0) return std::nullopt;
     InformationBelief result{belief.mean, belief.covariance, Tangent<X>::Zero(n)};
     if (!detail::sound_inverse<dof<X>, S>(belief.covariance, result.information)) return std::nullopt;
     return result;
   }
   /// Mean and covariance; nothing while some direction has no information beyond the rounding of Y.
   [[nodiscard]] std::optional<Gaussian<X>> gaussian() const {
+    if (detail::common_size(point, information, vector) == 0) return std::nullopt;
     Gaussian<X> result{point, information};
     Tangent<X> d = vector;
     if (!solve(result.covariance, d)) return std::nullopt;
@@ -272,19 +275,22 @@ struct InformationFilter {
 
   /// Moves the belief by one step of dt. The mean of what is known is moved by the process first, so the
   /// point of linearisation follows the estimate. Refused: a singular F, a Q that is no covariance.
-  template <LinearisedProcess F>
-  Status predict(InformationBelief<typename F::State>& belief, const F& process,
-                 const typename F::Control& control, double dt) const {
+  template <class F, class U = typename F::Control>
+    requires(LinearisedProcess<F> || detail::explain_sizes<F>)
+  Status predict(InformationBelief<typename F::State>& belief, const F& process, const U& control,
+                 double dt) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
     if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
+    const int size = detail::common_size(belief.point, belief.information, belief.vector);
+    const detail::PlainProcess plain(process, size, control);
+    if (plain.misfit()) return Status::size_mismatch;
     InformationBelief<X> next = belief;
     recentre(next);
-    const int size = static_cast<int>(next.vector.size());
-    const CovarianceOf<X> f = detail::dense_of(process.jacobian(next.point, control, dt));
-    CovarianceOf<X> q = process.noise(next.point, control, dt);
-    if (f.rows() != size || q.rows() != size) return Status::size_mismatch;
+    const CovarianceOf<X> f = detail::dense_of(plain.jacobian(next.point, dt));
+    CovarianceOf<X> q = detail::dense_of(plain.noise(next.point, dt));
+    if (plain.misfit()) return Status::size_mismatch;
     if (!all_finite(f) || !all_finite(next.information) || !all_finite(next.vector))
       return Status::not_finite;
     Status status = detail::stabilise<X>(q, fading, stabilising_noise);
@@ -298,27 +304,30 @@ struct InformationFilter {
     if (status != Status::accepted) return status;
     next.information = detail::squared_root<n, S>(transposed<n, n, S>(root));
     next.vector = detail::column_product(transposed<n, n, S>(root), b);
-    next.point = process.propagate(next.point, control, dt);
+    next.point = plain.propagate(next.point, dt);
+    if (plain.misfit()) return Status::size_mismatch;
     return keep(belief, next);
   }
-  template <LinearisedProcess F>
-    requires std::same_as<typename F::Control, NoControl>
+  template <class F>
+    requires(LinearisedProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
   Status predict(InformationBelief<typename F::State>& belief, const F& process, double dt) const {
     return predict(belief, process, NoControl{}, dt);
   }
 
   /// Adds the information of the measurement z, linearised at the belief's point. O(M^2 N + M N^2).
-  template <LinearisedMeasurement H>
-  Status update(InformationBelief<typename H::State>& belief, const H& sensor,
-                const typename H::Measurement& z) const {
+  template <class H, class V = typename H::Measurement>
+    requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
+  Status update(InformationBelief<typename H::State>& belief, const H& sensor, const V& z) const {
     using X = typename H::State;
-    using Z = typename H::Measurement;
     using S = ScalarOf<X>;
-    constexpr int m = dof<Z>;
-    const Matrix<m, dof<X>, S> h = detail::dense_of(sensor.jacobian(belief.point));
-    const Matrix<m, m, S> r = sensor.noise(belief.point);
-    const Vector<m, S> residual = local(Z(sensor.predict(belief.point)), z);
-    if (h.cols() != belief.vector.size() || h.rows() != residual.size()) return Status::size_mismatch;
+    constexpr int m = dof<typename H::Measurement>;
+    const int size = detail::common_size(belief.point, belief.information, belief.vector);
+    const detail::PlainSensor plain(sensor, size, z);
+    const Matrix<m, dof<X>, S> h = detail::dense_of(plain.jacobian(belief.point));
+    const Matrix<m, m, S> r = detail::dense_of(plain.noise(belief.point));
+    if (plain.misfit()) return Status::size_mismatch;
+    const Vector<m, S> residual = plain.residual(belief.point);
+    if (plain.misfit()) return Status::size_mismatch;
     const Cholesky<m, S> root(r);
     if (!all_finite(r)) return Status::not_finite;
     if (!root.good() || !(root.least_share() > detail::digits_left<S>)) return Status::not_positive_definite;
@@ -332,6 +341,7 @@ struct InformationFilter {
   /// Moves the point of linearisation to the mean; false, and nothing changed, while that is unknown.
   template <Manifold X>
   static bool recentre(InformationBelief<X>& belief) {
+    if (detail::common_size(belief.point, belief.information, belief.vector) == 0) return false;
     CovarianceOf<X> inverse = belief.information;
     Tangent<X> d = belief.vector;
     if (!belief.solve(inverse, d) || !all_finite(d)) return false;

@@ -23,6 +23,7 @@
 #include <cairn/core/statistics.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
@@ -35,7 +36,18 @@ struct ModeBelief {
   std::array<double, R> probability;
 
   /// One Gaussian with the mixture's mean (two rounds of tangent averaging) and covariance.
-  [[nodiscard]] Gaussian<X> combined() const { return mixture(modes, probability); }
+  [[nodiscard]] Gaussian<X> combined() const {
+    CAIRN_EXPECTS(fits(), "the modes of a belief have one size");
+    return mixture(modes, probability);
+  }
+
+  /// The modes have one size, and their covariances fit it. Always so where that size is fixed.
+  [[nodiscard]] bool fits() const {
+    const int n = detail::common_size(modes[0].mean, modes[0].covariance);
+    bool good = n > 0;
+    for (const Gaussian<X>& mode : modes) good = good && detail::common_size(mode.mean, mode.covariance) == n;
+    return good;
+  }
 
   /// The probabilities are numbers from 0 to 1 that sum to 1, within 1e-6. Otherwise: not_finite, depleted
   /// where none is above zero, bad_weights.
@@ -84,12 +96,12 @@ struct Interacting {
 
   /// Mixes, then moves every mode by its own process of `processes`. All or none are kept. Refused: rows of
   /// `switching` that do not sum to 1 (bad_option), probabilities that are none (see ModeBelief::weighed).
-  template <Manifold X, class... F>
+  template <Manifold X, class... F, class U = typename std::tuple_element_t<0, std::tuple<F...>>::Control>
     requires(sizeof...(F) == R)
-  Status predict(ModeBelief<X, R>& belief, const std::tuple<F...>& processes,
-                 const typename std::tuple_element_t<0, std::tuple<F...>>::Control& control,
+  Status predict(ModeBelief<X, R>& belief, const std::tuple<F...>& processes, const U& control,
                  double dt) const {
     if (!stochastic()) return Status::bad_option;
+    if (!belief.fits()) return Status::size_mismatch;
     if (const Status status = belief.weighed(); status != Status::accepted) return status;
     ModeBelief<X, R> next = belief;
     for (std::size_t j = 0; j < R; ++j) {
@@ -117,9 +129,10 @@ struct Interacting {
 
   /// Every mode takes in z; a mode that refuses keeps its belief and loses its weight. Refused by all: the
   /// first mode's reason, and the belief as it was.
-  template <MeasurementModel H>
-  Status update(ModeBelief<typename H::State, R>& belief, const H& sensor,
-                const typename H::Measurement& z) const {
+  template <class H, class V = typename H::Measurement>
+    requires(MeasurementModel<H> || detail::explain_sizes<H>)
+  Status update(ModeBelief<typename H::State, R>& belief, const H& sensor, const V& z) const {
+    if (!belief.fits()) return Status::size_mismatch;
     if (const Status status = belief.weighed(); status != Status::accepted) return status;
     ModeBelief<typename H::State, R> next = belief;
     std::array<double, R> weight{};

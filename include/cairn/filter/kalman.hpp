@@ -31,30 +31,26 @@ struct Kalman {
   double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
 
   /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite.
-  template <LinearProcess F>
-  Status predict(Gaussian<typename F::State>& belief, const F& process, const typename F::Control& control,
-                 double dt) const {
-    if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
-    if (!(fading >= 1.0) || !(stabilising_noise >= 0.0)) return Status::bad_option;
-    return detail::advance(belief, process.propagate(belief.mean, control, dt),
-                           process.jacobian(belief.mean, control, dt),
-                           process.noise(belief.mean, control, dt), fading, stabilising_noise);
+  template <class F, class U = typename F::Control>
+    requires(LinearProcess<F> || detail::explain_sizes<F>)
+  Status predict(Gaussian<typename F::State>& belief, const F& process, const U& control, double dt) const {
+    return detail::predict_linearised(belief, process, control, dt, fading, stabilising_noise);
   }
 
   /// The same for a process without control.
-  template <LinearProcess F>
-    requires std::same_as<typename F::Control, NoControl>
+  template <class F>
+    requires(LinearProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
   Status predict(Gaussian<typename F::State>& belief, const F& process, double dt) const {
     return predict(belief, process, NoControl{}, dt);
   }
 
   /// Takes in the measurement z, or refuses it and leaves the belief as it was.
-  template <LinearMeasurement H>
+  template <class H, class V = typename H::Measurement>
+    requires(LinearMeasurement<H> || detail::explain_sizes<H>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
-      Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
-    return detail::correct<typename H::State, dof<typename H::Measurement>>(
-        belief, sensor.jacobian(belief.mean), detail::dense_of(sensor.noise(belief.mean)),
-        local(typename H::Measurement(sensor.predict(belief.mean)), z), gate, form);
+      Gaussian<typename H::State>& belief, const H& sensor, const V& z) const {
+    const detail::PlainSensor plain(sensor, detail::common_size(belief.mean, belief.covariance), z);
+    return detail::update_linearised(belief, plain, gate, form);
   }
 };
 

@@ -36,6 +36,7 @@
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/information.hpp>
 #include <cairn/filter/model.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
@@ -45,13 +46,9 @@ namespace cairn::inline CAIRN_ABI {
 template <class F>
 concept ContinuousProcess = Manifold<typename F::State> &&
                             requires(const F& f, const typename F::State& x, const typename F::Control& u) {
-                              { f.rate(x, u) } -> std::convertible_to<Tangent<typename F::State>>;
-                              {
-                                f.rate_jacobian(x, u)
-                              } -> std::convertible_to<CovarianceOf<typename F::State>>;
-                              {
-                                f.spectral_density(x, u)
-                              } -> std::convertible_to<CovarianceOf<typename F::State>>;
+                              { f.rate(x, u) } -> StateOf<Tangent<typename F::State>>;
+                              { f.rate_jacobian(x, u) } -> detail::CovarianceLike<typename F::State>;
+                              { f.spectral_density(x, u) } -> detail::CovarianceLike<typename F::State>;
                             };
 
 /// Kalman-Bucy filter. Options only. For states that are not vectors the rate is taken in the tangent space
@@ -63,62 +60,85 @@ struct KalmanBucy {
   int most_parts = 100000;  ///< of one call, those that were too long included; >= 1
 
   /// Moves the belief by dt without measurement.
-  template <ContinuousProcess F>
-  Status predict(Gaussian<typename F::State>& belief, const F& process, const typename F::Control& control,
-                 double dt) const {
+  template <class F, class U = typename F::Control>
+    requires(ContinuousProcess<F> || detail::explain_sizes<F>)
+  Status predict(Gaussian<typename F::State>& belief, const F& process, const U& control, double dt) const {
     using X = typename F::State;
     using P = CovarianceOf<X>;
+    const detail::PlainProcess plain(process, detail::common_size(belief.mean, belief.covariance), control);
+    if (plain.misfit()) return Status::size_mismatch;
     const auto rate = [&](const X& x, const P& p) {
-      const P a = process.rate_jacobian(x, control);
+      const P a = plain.rate_jacobian(x);
       const P ap = a * p;
-      return Rates<X>{process.rate(x, control),
-                      P(ap + ap.transpose() + process.spectral_density(x, control))};
+      return Rates<X>{plain.rate(x), P(ap + ap.transpose() + plain.spectral_density(x))};
     };
-    if (const Status status = judge(process, belief.mean, control); status != Status::accepted) return status;
-    return integrate<Matrices::covariances>(belief.mean, belief.covariance, rate, dt);
+    if (const Status status = judge(plain, belief.mean); status != Status::accepted) return status;
+    Gaussian<X> next = belief;
+    const Status status = integrate<Matrices::covariances>(next.mean, next.covariance, rate, dt);
+    if (plain.misfit()) return Status::size_mismatch;
+    if (status == Status::accepted) belief = next;
+    return status;
   }
 
   /// Moves the belief by dt while the sensor reports z, held constant; sensor.noise() is a spectral density.
-  template <ContinuousProcess F, LinearisedMeasurement H>
-  Status filter(Gaussian<typename F::State>& belief, const F& process, const typename F::Control& control,
-                const H& sensor, const typename H::Measurement& z, double dt) const {
+  template <class F, class H, class U = typename F::Control, class V = typename H::Measurement>
+    requires(ContinuousProcess<F> || detail::explain_sizes<F>) &&
+            (LinearisedMeasurement<H> || detail::explain_sizes<H>)
+  Status filter(Gaussian<typename F::State>& belief, const F& process, const U& control, const H& sensor,
+                const V& z, double dt) const {
     using X = typename F::State;
     using P = CovarianceOf<X>;
+    const int n = detail::common_size(belief.mean, belief.covariance);
+    const detail::PlainProcess plain(process, n, control);
+    const detail::PlainSensor plain_sensor(sensor, n, z);
+    const auto misfit = [&] { return plain.misfit() || plain_sensor.misfit(); };
+    if (misfit()) return Status::size_mismatch;
     const auto rate = [&](const X& x, const P& p) {
-      const auto seen = look(sensor, x, z);
-      const P a = process.rate_jacobian(x, control);
+      const auto seen = look(plain_sensor, x);
+      const P a = plain.rate_jacobian(x);
       const P ap = a * p;
       const Tangent<X> pull = p * seen.state;
-      return Rates<X>{process.rate(x, control) + pull,
-                      P(ap + ap.transpose() + process.spectral_density(x, control) - p * seen.matrix * p)};
+      return Rates<X>{plain.rate(x) + pull,
+                      P(ap + ap.transpose() + plain.spectral_density(x) - p * seen.matrix * p)};
     };
-    if (const Status status = judge(process, belief.mean, control); status != Status::accepted) return status;
-    if (const Status status = judge(sensor, belief.mean); status != Status::accepted) return status;
-    return integrate<Matrices::covariances>(belief.mean, belief.covariance, rate, dt);
+    if (const Status status = judge(plain, belief.mean); status != Status::accepted) return status;
+    if (const Status status = judge(plain_sensor, belief.mean); status != Status::accepted) return status;
+    Gaussian<X> next = belief;
+    const Status status = integrate<Matrices::covariances>(next.mean, next.covariance, rate, dt);
+    if (misfit()) return Status::size_mismatch;
+    if (status == Status::accepted) belief = next;
+    return status;
   }
 
   /// The same in information form: point and Y move together, y is zero throughout. Y must be positive
   /// definite for the estimate to move.
-  template <ContinuousProcess F, LinearisedMeasurement H>
-  Status filter(InformationBelief<typename F::State>& belief, const F& process,
-                const typename F::Control& control, const H& sensor, const typename H::Measurement& z,
-                double dt) const {
+  template <class F, class H, class U = typename F::Control, class V = typename H::Measurement>
+    requires(ContinuousProcess<F> || detail::explain_sizes<F>) &&
+            (LinearisedMeasurement<H> || detail::explain_sizes<H>)
+  Status filter(InformationBelief<typename F::State>& belief, const F& process, const U& control,
+                const H& sensor, const V& z, double dt) const {
     using X = typename F::State;
     using P = CovarianceOf<X>;
+    const int n = detail::common_size(belief.point, belief.information, belief.vector);
+    const detail::PlainProcess plain(process, n, control);
+    const detail::PlainSensor plain_sensor(sensor, n, z);
+    const auto misfit = [&] { return plain.misfit() || plain_sensor.misfit(); };
+    if (misfit()) return Status::size_mismatch;
     InformationBelief<X> next = belief;
     if (!InformationFilter::recentre(next)) return Status::not_positive_definite;
     const auto rate = [&](const X& x, const P& y) {
-      const auto seen = look(sensor, x, z);
-      const P a = process.rate_jacobian(x, control);
+      const auto seen = look(plain_sensor, x);
+      const P a = plain.rate_jacobian(x);
       const P ya = y * a;
       const Tangent<X> pull = Cholesky<dof<X>, ScalarOf<X>>(y).solve(seen.state);
-      return Rates<X>{process.rate(x, control) + pull,
-                      P(seen.matrix - ya - ya.transpose() - y * process.spectral_density(x, control) * y)};
+      return Rates<X>{plain.rate(x) + pull,
+                      P(seen.matrix - ya - ya.transpose() - y * plain.spectral_density(x) * y)};
     };
-    Status status = judge(process, next.point, control);
-    if (status == Status::accepted) status = judge(sensor, next.point);
+    Status status = judge(plain, next.point);
+    if (status == Status::accepted) status = judge(plain_sensor, next.point);
     if (status == Status::accepted)
       status = integrate<Matrices::informations>(next.point, next.information, rate, dt);
+    if (misfit()) return Status::size_mismatch;
     if (status == Status::accepted) belief = next;
     return status;
   }
@@ -126,16 +146,18 @@ struct KalmanBucy {
 private:
   enum class Matrices { covariances, informations };
 
-  template <class F, Manifold X, class U>
-  static Status judge(const F& process, const X& x, const U& control) {
-    const CovarianceOf<X> q = process.spectral_density(x, control);
+  template <class F, class U, Manifold X>
+  static Status judge(const detail::PlainProcess<F, U>& process, const X& x) {
+    const CovarianceOf<X> q = process.spectral_density(x);
+    if (process.misfit()) return Status::size_mismatch;
     return detail::judge_noise<dof<X>, ScalarOf<X>>(q);
   }
-  template <class H, Manifold X>
-  static Status judge(const H& sensor, const X& x) {
+  template <class H, class V, Manifold X>
+  static Status judge(const detail::PlainSensor<H, V>& sensor, const X& x) {
     using S = ScalarOf<X>;
     constexpr int m = dof<typename H::Measurement>;
-    const Matrix<m, m, S> r = sensor.noise(x);
+    const Matrix<m, m, S> r = detail::dense_of(sensor.noise(x));
+    if (sensor.misfit()) return Status::size_mismatch;
     if (!all_finite(r)) return Status::not_finite;
     const Cholesky<m, S> root(r);
     return root.good() && root.least_share() > detail::digits_left<S> ? Status::accepted
@@ -149,14 +171,13 @@ private:
   };
 
   /// What the sensor says at x: H^T R^-1 H and H^T R^-1 (z - h(x)); NaN where R is not positive definite.
-  template <class H, Manifold X>
-  static Rates<X> look(const H& sensor, const X& x, const typename H::Measurement& z) {
+  template <class H, class V, Manifold X>
+  static Rates<X> look(const detail::PlainSensor<H, V>& sensor, const X& x) {
     using S = ScalarOf<X>;
-    using Z = typename H::Measurement;
-    constexpr int m = dof<Z>;
+    constexpr int m = dof<typename H::Measurement>;
     const Matrix<m, dof<X>, S> h = detail::dense_of(sensor.jacobian(x));
-    const Matrix<m, m, S> r = sensor.noise(x);
-    const Vector<m, S> residual = local(Z(sensor.predict(x)), z);
+    const Matrix<m, m, S> r = detail::dense_of(sensor.noise(x));
+    const Vector<m, S> residual = sensor.residual(x);
     const Cholesky<m, S> root(r);
     return {h.transpose() * root.solve(residual), h.transpose() * root.solve(h)};
   }

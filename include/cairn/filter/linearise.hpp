@@ -24,8 +24,11 @@
 #pragma once
 
 #include <concepts>
+#include <limits>
 
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/explain_sizes.hpp>
+#include <cairn/filter/matrix_of.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/structure.hpp>
 #include <cairn/manifold/jacobian.hpp>
@@ -40,31 +43,19 @@ struct Numeric : Model {
 
   template <class Control>
     requires ProcessModel<Model>
-  [[nodiscard]] CovarianceOf<State> jacobian(const State& x, const Control& u, double dt) const {
+  [[nodiscard]] auto jacobian(const State& x, const Control& u, double dt) const {
     const Model& model = *this;
-    return numeric_jacobian([&](const State& s) -> State { return model.propagate(s, u, dt); }, x);
+    return numeric_jacobian(
+        [&](const State& s) { return detail::state_found<State>(model.propagate(s, u, dt)); }, x);
   }
   [[nodiscard]] auto jacobian(const State& x) const
     requires MeasurementModel<Model>
   {
     using Z = typename Model::Measurement;
     const Model& model = *this;
-    return numeric_jacobian([&](const State& s) -> Z { return model.predict(s); }, x);
+    return numeric_jacobian([&](const State& s) { return detail::state_found<Z>(model.predict(s)); }, x);
   }
 };
-
-namespace detail {
-
-// An Eigen expression becomes the matrix it stands for.
-template <class Y>
-[[nodiscard]] auto plain(const Y& y) {
-  if constexpr (requires { y.eval(); })
-    return y.eval();
-  else
-    return y;
-}
-
-}  // namespace detail
 
 /// The model with Jacobians by dual numbers.
 template <class Model>
@@ -73,15 +64,15 @@ struct Automatic : Model {
 
   template <class Control>
     requires ProcessModel<Model>
-  [[nodiscard]] CovarianceOf<State> jacobian(const State& x, const Control& u, double dt) const {
+  [[nodiscard]] auto jacobian(const State& x, const Control& u, double dt) const {
     const Model& model = *this;
-    return automatic_jacobian([&](const auto& s) { return detail::plain(model.propagate(s, u, dt)); }, x);
+    return automatic_jacobian([&](const auto& s) { return model.propagate(s, u, dt); }, x);
   }
   [[nodiscard]] auto jacobian(const State& x) const
     requires MeasurementModel<Model>
   {
     const Model& model = *this;
-    return automatic_jacobian([&](const auto& s) { return detail::plain(model.predict(s)); }, x);
+    return automatic_jacobian([&](const auto& s) { return model.predict(s); }, x);
   }
 };
 
@@ -94,7 +85,8 @@ template <class Model>
   return {model};
 }
 
-/// Largest difference of any entry between a given Jacobian and a reference, relative to 1 + |reference|.
+/// Largest difference of any entry between a given Jacobian and a reference, relative to 1 + |reference|;
+/// infinite where their sizes differ.
 struct JacobianComparison {
   double worst = 0.0;
   int row = 0;
@@ -105,8 +97,12 @@ struct JacobianComparison {
 template <class A, class B>
 [[nodiscard]] JacobianComparison compare_jacobians(const A& given, const B& reference) {
   JacobianComparison result;
-  const auto a = detail::dense_of(given);
-  const auto b = detail::dense_of(reference);
+  const auto a = detail::as_found(given);
+  const auto b = detail::as_found(reference);
+  if (!detail::has_size(a, b.rows(), b.cols())) {
+    result.worst = std::numeric_limits<double>::infinity();
+    return result;
+  }
   for (int i = 0; i < static_cast<int>(b.rows()); ++i)
     for (int j = 0; j < static_cast<int>(b.cols()); ++j) {
       const double expected = static_cast<double>(b(i, j));
@@ -118,13 +114,15 @@ template <class A, class B>
 }
 
 /// The process's own Jacobian against central differences at (x, u, dt).
-template <LinearisedProcess F>
+template <class F>
+  requires(LinearisedProcess<F> || detail::explain_sizes<F>)
 [[nodiscard]] JacobianComparison check_jacobian(const F& f, const typename F::State& x,
                                                 const typename F::Control& u, double dt) {
   return compare_jacobians(f.jacobian(x, u, dt), numeric(f).jacobian(x, u, dt));
 }
 /// The sensor's own Jacobian against central differences at x.
-template <LinearisedMeasurement H>
+template <class H>
+  requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
 [[nodiscard]] JacobianComparison check_jacobian(const H& h, const typename H::State& x) {
   return compare_jacobians(h.jacobian(x), numeric(h).jacobian(x));
 }
@@ -152,14 +150,16 @@ template <class A, class B, class C>
 }  // namespace detail
 
 /// All three Jacobians of a process whose propagate is a template over the scalar, at (x, u, dt).
-template <LinearisedProcess F>
+template <class F>
+  requires(LinearisedProcess<F> || detail::explain_sizes<F>)
 [[nodiscard]] JacobianCheck check_jacobians(const F& f, const typename F::State& x,
                                             const typename F::Control& u, double dt) {
   return detail::check_three(f.jacobian(x, u, dt), automatic(f).jacobian(x, u, dt),
                              numeric(f).jacobian(x, u, dt));
 }
 /// All three Jacobians of a sensor whose predict is a template over the scalar, at x.
-template <LinearisedMeasurement H>
+template <class H>
+  requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
 [[nodiscard]] JacobianCheck check_jacobians(const H& h, const typename H::State& x) {
   return detail::check_three(h.jacobian(x), automatic(h).jacobian(x), numeric(h).jacobian(x));
 }

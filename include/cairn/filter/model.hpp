@@ -22,13 +22,18 @@
 /// Laws, which tests check and types cannot: noise is symmetric and at least zero (a sensor's above zero),
 /// propagate(x, u, 0) = x, jacobians agree with numeric differentiation in the tangent spaces. A model whose
 /// propagate or predict is its (constant in x) jacobian times x plus something known says so with
-/// `static constexpr bool linear = true;`. Jacobians may be Structured. Nothing is differentiated silently:
-/// numeric(model) and automatic(model) of linearise.hpp are asked for by name.
+/// `static constexpr bool linear = true;`. Nothing is differentiated silently: numeric(model) and
+/// automatic(model) of linearise.hpp are asked for by name.
+///
+/// Matrices and vectors may be returned as anything that stands for one (matrix_of.hpp): Structured, with
+/// zeros that the filters skip, row-major, a Map, an expression. Another number of rows or columns, or
+/// another number type, does not compile; sizes known at run time are compared (Status::size_mismatch).
 #pragma once
 
 #include <concepts>
 
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/matrix_of.hpp>
 #include <cairn/manifold/manifold.hpp>
 #include <cairn/version.hpp>
 
@@ -45,19 +50,28 @@ using CovarianceOf = Matrix<dof<X>, dof<X>, ScalarOf<X>>;
 template <Manifold To, Manifold From>
 using JacobianOf = Matrix<dof<To>, dof<From>, ScalarOf<From>>;
 
+namespace detail {
+
+template <class A, class X>
+concept CovarianceLike = MatrixOf<A, dof<X>, dof<X>, ScalarOf<X>>;
+template <class A, class To, class From>
+concept JacobianLike = MatrixOf<A, dof<To>, dof<From>, ScalarOf<From>>;
+
+}  // namespace detail
+
 /// How a state moves: propagate and noise.
 template <class F>
 concept ProcessModel = Manifold<typename F::State> && requires(const F& f, const typename F::State& x,
                                                                const typename F::Control& u, double dt) {
-  { f.propagate(x, u, dt) } -> std::convertible_to<typename F::State>;
-  { f.noise(x, u, dt) } -> std::convertible_to<CovarianceOf<typename F::State>>;
+  { f.propagate(x, u, dt) } -> StateOf<typename F::State>;
+  { f.noise(x, u, dt) } -> detail::CovarianceLike<typename F::State>;
 };
 
 /// A process that gives its derivative: step of the new state by step of the old.
 template <class F>
 concept LinearisedProcess = ProcessModel<F> && requires(const F& f, const typename F::State& x,
                                                         const typename F::Control& u, double dt) {
-  { f.jacobian(x, u, dt) } -> std::convertible_to<CovarianceOf<typename F::State>>;
+  { f.jacobian(x, u, dt) } -> detail::JacobianLike<typename F::State, typename F::State>;
 };
 
 /// A process that is linear in its state.
@@ -67,15 +81,16 @@ concept LinearProcess = LinearisedProcess<F> && F::linear;
 /// What a sensor reports of a state: predict and noise.
 template <class H>
 concept MeasurementModel = Manifold<typename H::State> && Manifold<typename H::Measurement> &&
+                           std::same_as<ScalarOf<typename H::State>, ScalarOf<typename H::Measurement>> &&
                            requires(const H& h, const typename H::State& x) {
-                             { h.predict(x) } -> std::convertible_to<typename H::Measurement>;
-                             { h.noise(x) } -> std::convertible_to<CovarianceOf<typename H::Measurement>>;
+                             { h.predict(x) } -> StateOf<typename H::Measurement>;
+                             { h.noise(x) } -> detail::CovarianceLike<typename H::Measurement>;
                            };
 
 /// A sensor that gives its derivative: step of the measurement by step of the state.
 template <class H>
 concept LinearisedMeasurement = MeasurementModel<H> && requires(const H& h, const typename H::State& x) {
-  { h.jacobian(x) } -> std::convertible_to<JacobianOf<typename H::Measurement, typename H::State>>;
+  { h.jacobian(x) } -> detail::JacobianLike<typename H::Measurement, typename H::State>;
 };
 
 /// A sensor that is linear in the state.
@@ -92,6 +107,37 @@ namespace detail {
 /// A + B, where both are known at compile time.
 template <int A, int B>
 inline constexpr int size_sum = A == dynamic || B == dynamic ? dynamic : A + B;
+
+/// Numbers of a step where mean and matrix fit one another, else 0.
+template <Manifold X>
+[[gnu::always_inline]] [[nodiscard]] inline int common_size(const X& mean, const CovarianceOf<X>& matrix) {
+  if constexpr (dof<X> != dynamic) {
+    return dof<X>;
+  } else {
+    const int n = dof_of(mean);
+    return has_size(matrix, n, n) ? n : 0;
+  }
+}
+template <Manifold X>
+[[gnu::always_inline]] [[nodiscard]] inline int common_size(const X& mean, const CovarianceOf<X>& matrix,
+                                                            const Tangent<X>& vector) {
+  const int n = common_size(mean, matrix);
+  return vector.size() == n ? n : 0;
+}
+
+/// Numbers of a step where all of one or more states have as many, else 0.
+template <class States>
+[[nodiscard]] int common_size(const States& states) {
+  using X = typename States::value_type;
+  if constexpr (dof<X> != dynamic) {
+    return dof<X>;
+  } else {
+    const int n = states.empty() ? 0 : dof_of(states[0]);
+    for (const X& x : states)
+      if (dof_of(x) != n) return 0;
+    return n;
+  }
+}
 
 }  // namespace detail
 }  // namespace cairn::inline CAIRN_ABI

@@ -21,6 +21,7 @@
 #include <cairn/filter/kalman.hpp>
 #include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/smoother.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/filter/structure.hpp>
@@ -92,8 +93,9 @@ struct NoiseSums {
     using X = typename F::State;
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
-    const CovarianceOf<X> jacobian = dense_of(f.jacobian(before.mean, u, dt));
-    const Tangent<X> e = local(X(f.propagate(before.mean, u, dt)), after.mean);
+    const PlainProcess plain(f, common_size(before.mean, before.covariance), u);
+    const CovarianceOf<X> jacobian = dense_of(plain.jacobian(before.mean, dt));
+    const Tangent<X> e = local(X(plain.propagate(before.mean, dt)), after.mean);
     CovarianceOf<X> left = -column_product(jacobian, step.gain);
     for (int i = 0; i < static_cast<int>(process.rows()); ++i) left(i, i) += S(1);
     const CovarianceOf<X> of_after = column_product(left, semi_definite_root<n, S>(after.covariance));
@@ -103,12 +105,23 @@ struct NoiseSums {
   }
   void add_sighting(const H& h, const typename H::Measurement& z, const Gaussian<typename H::State>& belief) {
     using Z = typename H::Measurement;
-    const JacobianOf<Z, typename H::State> jacobian = dense_of(h.jacobian(belief.mean));
-    const Tangent<Z> r = local(Z(h.predict(belief.mean)), z);
+    const PlainSensor plain(h, common_size(belief.mean, belief.covariance), z);
+    const JacobianOf<Z, typename H::State> jacobian = dense_of(plain.jacobian(belief.mean));
+    const Tangent<Z> r = plain.residual(belief.mean);
     sensor += r * r.transpose() + jacobian * belief.covariance * jacobian.transpose();
     ++sightings;
   }
 };
+
+/// What the sensor says of its noise at x.
+template <MeasurementModel H>
+[[nodiscard]] CovarianceOf<typename H::Measurement> noise_at(const H& sensor, const typename H::State& x,
+                                                             bool& misfit) {
+  using Z = typename H::Measurement;
+  auto&& noise = sensor.noise(x);
+  const Eigen::Index size = dof<Z> != dynamic ? dof<Z> : noise.rows();
+  return plain_matrix<dof<Z>, dof<Z>, ScalarOf<Z>>(noise, size, size, misfit);
+}
 
 /// Smooths the record with the given noise; sums the log-likelihood and the expected squares.
 template <class Filter, class F, class H>
@@ -142,17 +155,26 @@ Status smooth_record(const Filter& filter, const NoiseRecord<F, H>& record,
 }  // namespace detail
 
 /// Estimates the noise of `process` and `sensor`, beginning with what they say themselves at the start of the
-/// record. not_converged: `rounds` are spent (the result is usable); depleted: nothing to learn from.
-/// O(rounds * steps).
-template <class Filter = Kalman, LinearisedProcess F, LinearisedMeasurement H>
+/// record. not_converged: `rounds` are spent (the result is usable); depleted: nothing to learn from;
+/// size_mismatch: a size of the record's and the models' does not fit. O(rounds * steps).
+template <class Filter = Kalman, class F, class H>
+  requires(LinearisedProcess<F> || detail::explain_sizes<F>) &&
+          (LinearisedMeasurement<H> || detail::explain_sizes<H>)
 [[nodiscard]] NoiseFit<F, H> fit_noise(const NoiseRecord<F, H>& record, const F& process, const H& sensor,
                                        const NoiseFitting& options = {}, const Filter& filter = {}) {
   using Q = CovarianceOf<typename F::State>;
   using R = CovarianceOf<typename H::Measurement>;
-  const int n = dof_of(record.prior.mean);
-  NoiseFit<F, H> fit{Q::Zero(n, n).eval(), R(sensor.noise(record.prior.mean)), {}, Status::depleted};
+  const int n = detail::common_size(record.prior.mean, record.prior.covariance);
+  bool misfit = n == 0;
+  NoiseFit<F, H> fit{
+      Q::Zero(n, n).eval(), detail::noise_at(sensor, record.prior.mean, misfit), {}, Status::depleted};
   if (record.steps.empty()) return fit;
-  fit.process = process.noise(record.prior.mean, record.steps[0].control, record.steps[0].dt);
+  const detail::PlainProcess plain(process, n, record.steps[0].control);
+  fit.process = detail::dense_of(plain.noise(record.prior.mean, record.steps[0].dt));
+  if (misfit || plain.misfit()) {
+    fit.status = Status::size_mismatch;
+    return fit;
+  }
   if (options.rounds < 0 || !(options.tolerance >= 0.0)) {
     fit.status = Status::bad_option;
     return fit;

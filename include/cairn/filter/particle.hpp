@@ -30,6 +30,7 @@
 #include <cairn/core/statistics.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
@@ -169,7 +170,7 @@ struct Particles {
   /// Adds to the logarithms of the weights and makes them sum to 1. Refused, and nothing changed, where no
   /// weight is left or one is NaN.
   Status reweigh(std::span<const double> log_likelihoods) {
-    if (log_likelihoods.size() != size()) return Status::size_mismatch;
+    if (log_likelihoods.size() != size() || log_weights.size() != size()) return Status::size_mismatch;
     std::vector<double> next(size());
     for (std::size_t i = 0; i < size(); ++i) {
       next[i] = log_weights[i] + log_likelihoods[i];
@@ -185,6 +186,7 @@ struct Particles {
   /// Draws `count` particles in proportion to the weights; all are equal afterwards. Throws Error, and nothing
   /// is changed, where a weight is not a number or all are zero.
   void resample(std::size_t count, Resampling scheme, Random& random) {
+    CAIRN_EXPECTS(log_weights.size() == size(), "particles need one weight each");
     std::vector<X> next;
     next.reserve(count);
     for (const std::size_t i : resampled_indices(weights(), count, scheme, random)) next.push_back(states[i]);
@@ -207,6 +209,7 @@ struct KldSampling {
 template <class X, class Bin>
 Status resample_by_kld(Particles<X>& belief, const KldSampling& options, const Bin& bin, Random& random) {
   if (belief.states.empty()) return Status::depleted;
+  if (belief.log_weights.size() != belief.size()) return Status::size_mismatch;
   if (!(options.epsilon > 0.0) || options.most < 1 || options.least > options.most) return Status::bad_option;
   std::vector<double> sums = belief.weights();
   for (const double weight : sums)
@@ -242,6 +245,8 @@ template <Manifold X>
 [[nodiscard]] Gaussian<X> moments(const Particles<X>& particles) {
   using S = ScalarOf<X>;
   CAIRN_EXPECTS(!particles.states.empty(), "moments needs at least one particle");
+  CAIRN_EXPECTS(particles.log_weights.size() == particles.size() && detail::common_size(particles.states) > 0,
+                "moments needs particles of one size with one weight each");
   const std::vector<double> w = particles.weights();
   X mean = particles.states[static_cast<std::size_t>(std::max_element(w.begin(), w.end()) - w.begin())];
   for (int round = 0; round < 2; ++round) {
@@ -265,19 +270,24 @@ struct ParticleFilter {
       0.5;  ///< resample when the effective number falls below this share; 0 never, 1 always
 
   /// Moves every particle and draws its noise.
-  template <ProcessModel F>
-  Status predict(Particles<typename F::State>& belief, const F& process, const typename F::Control& control,
-                 double dt, Random& random) const {
+  template <class F, class U = typename F::Control>
+    requires(ProcessModel<F> || detail::explain_sizes<F>)
+  Status predict(Particles<typename F::State>& belief, const F& process, const U& control, double dt,
+                 Random& random) const {
     using X = typename F::State;
     if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
     if (belief.states.empty()) return Status::depleted;
+    const detail::PlainProcess plain(process, detail::common_size(belief.states), control);
+    if (plain.misfit()) return Status::size_mismatch;
     std::vector<X> next;
     next.reserve(belief.size());
     for (const X& x : belief.states) {
-      const CovarianceOf<X> q = process.noise(x, control, dt);
+      const CovarianceOf<X> q = detail::dense_of(plain.noise(x, dt));
+      const X moved = plain.propagate(x, dt);
+      if (plain.misfit()) return Status::size_mismatch;
       if (!detail::is_valid_covariance<dof<X>, ScalarOf<X>>(q))
         return all_finite(q) ? Status::not_positive_definite : Status::not_finite;
-      next.push_back(sample(Gaussian<X>{process.propagate(x, control, dt), q}, random));
+      next.push_back(sample(Gaussian<X>{moved, q}, random));
       if (!detail::finite_state(next.back())) return Status::not_finite;
     }
     belief.states = std::move(next);
@@ -285,17 +295,20 @@ struct ParticleFilter {
   }
 
   /// Weighs every particle by the Gaussian likelihood of z, and resamples where the weights have degenerated.
-  template <MeasurementModel H>
-  Status update(Particles<typename H::State>& belief, const H& sensor, const typename H::Measurement& z,
-                Random& random) const {
-    using Z = typename H::Measurement;
-    using S = ScalarOf<Z>;
-    constexpr int m = dof<Z>;
+  template <class H, class V = typename H::Measurement>
+    requires(MeasurementModel<H> || detail::explain_sizes<H>)
+  Status update(Particles<typename H::State>& belief, const H& sensor, const V& z, Random& random) const {
+    using S = ScalarOf<typename H::State>;
+    constexpr int m = dof<typename H::Measurement>;
+    if (belief.states.empty()) return Status::depleted;
+    const detail::PlainSensor plain(sensor, detail::common_size(belief.states), z);
+    if (plain.misfit()) return Status::size_mismatch;
     std::vector<double> log_likelihoods(belief.size());
     for (std::size_t i = 0; i < belief.size(); ++i) {
       Innovation<m, S> in;
-      in.residual = local(Z(sensor.predict(belief.states[i])), z);
-      in.covariance = detail::dense_of(sensor.noise(belief.states[i]));
+      in.residual = plain.residual(belief.states[i]);
+      in.covariance = detail::dense_of(plain.noise(belief.states[i]));
+      if (plain.misfit()) return Status::size_mismatch;
       in.nis = detail::squared_mahalanobis<m, S>(in.residual, in.covariance);
       log_likelihoods[i] = static_cast<double>(in.log_likelihood());
     }

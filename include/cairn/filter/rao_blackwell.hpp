@@ -28,6 +28,7 @@
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/particle.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
@@ -38,11 +39,9 @@ template <class H>
 concept ConditionalMeasurement =
     Manifold<typename H::State> && Manifold<typename H::Part> && Manifold<typename H::Measurement> &&
     requires(const H& h, const typename H::State& x, const typename H::Part& part) {
-      { h.predict(x, part) } -> std::convertible_to<typename H::Measurement>;
-      {
-        h.part_jacobian(x, part)
-      } -> std::convertible_to<JacobianOf<typename H::Measurement, typename H::Part>>;
-      { h.noise(x, part) } -> std::convertible_to<CovarianceOf<typename H::Measurement>>;
+      { h.predict(x, part) } -> StateOf<typename H::Measurement>;
+      { h.part_jacobian(x, part) } -> detail::JacobianLike<typename H::Measurement, typename H::Part>;
+      { h.noise(x, part) } -> detail::CovarianceLike<typename H::Measurement>;
     };
 
 /// A sampled state and what is believed of each part if that sample is the truth.
@@ -64,9 +63,9 @@ struct HeldSensor {
   using Measurement = typename H::Measurement;
   const H& sensor;
   const typename H::State& held;
-  [[nodiscard]] Measurement predict(const State& part) const { return sensor.predict(held, part); }
-  [[nodiscard]] auto jacobian(const State& part) const { return sensor.part_jacobian(held, part); }
-  [[nodiscard]] auto noise(const State& part) const { return sensor.noise(held, part); }
+  [[nodiscard]] decltype(auto) predict(const State& part) const { return sensor.predict(held, part); }
+  [[nodiscard]] decltype(auto) jacobian(const State& part) const { return sensor.part_jacobian(held, part); }
+  [[nodiscard]] decltype(auto) noise(const State& part) const { return sensor.noise(held, part); }
 };
 
 }  // namespace detail
@@ -77,9 +76,10 @@ struct RaoBlackwell {
   ParticleFilter particles{};  ///< when and how to resample
 
   /// Moves every sampled state and draws its noise; the parts stay.
-  template <ProcessModel F, Manifold Part>
-  Status predict(ConditionalParticles<typename F::State, Part>& belief, const F& process,
-                 const typename F::Control& control, double dt, Random& random) const {
+  template <class F, Manifold Part, class U = typename F::Control>
+    requires(ProcessModel<F> || detail::explain_sizes<F>)
+  Status predict(ConditionalParticles<typename F::State, Part>& belief, const F& process, const U& control,
+                 double dt, Random& random) const {
     Particles<typename F::State> states;
     states.states.reserve(belief.size());
     for (const auto& particle : belief.states) states.states.push_back(particle.state);
@@ -93,10 +93,13 @@ struct RaoBlackwell {
   /// Part number `index` was seen as z: updates that part in every particle and weighs the particles by the
   /// likelihood of z. A particle in which the update is refused gets the likelihood of the gate's edge where
   /// it was gated, and none otherwise. Refused as a whole where an index is missing or no weight is left.
-  template <ConditionalMeasurement H>
+  template <class H, class V = typename H::Measurement>
+    requires(ConditionalMeasurement<H> || detail::explain_sizes<H>)
   Status update(ConditionalParticles<typename H::State, typename H::Part>& belief, std::size_t index,
-                const H& sensor, const typename H::Measurement& z, Random& random) const {
+                const H& sensor, const V& z, Random& random) const {
     if (belief.states.empty()) return Status::depleted;
+    const detail::Given<typename H::Measurement, V> given(z);
+    if (given.misfit()) return Status::size_mismatch;
     std::vector<double> log_likelihoods(belief.size());
     std::vector<Gaussian<typename H::Part>> next;
     next.reserve(belief.size());
@@ -104,7 +107,8 @@ struct RaoBlackwell {
       const auto& particle = belief.states[i];
       if (index >= particle.parts.size()) return Status::size_mismatch;
       next.push_back(particle.parts[index]);
-      auto in = parts.update(next.back(), detail::HeldSensor<H>{sensor, particle.state}, z);
+      auto in = parts.update(next.back(), detail::HeldSensor<H>{sensor, particle.state}, given.value());
+      if (in.status == Status::size_mismatch) return in.status;
       if (in.status == Status::gated) in.nis = static_cast<decltype(in.nis)>(parts.gate);
       const bool usable = in.accepted() || in.status == Status::gated;
       log_likelihoods[i] =

@@ -32,6 +32,7 @@
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/filter/structure.hpp>
 #include <cairn/version.hpp>
@@ -51,9 +52,10 @@ template <int M, class S>
 template <MeasurementModel H>
 struct Inflated : H {
   double factor = 1.0;
-  [[nodiscard]] CovarianceOf<typename H::Measurement> noise(const typename H::State& x) const {
-    const CovarianceOf<typename H::Measurement> r = H::noise(x);
-    return r * static_cast<ScalarOf<typename H::State>>(factor);
+  [[nodiscard]] auto noise(const typename H::State& x) const {
+    auto inflated = as_found(H::noise(x));
+    inflated *= static_cast<ScalarOf<typename H::State>>(factor);
+    return inflated;
   }
 };
 
@@ -67,8 +69,9 @@ struct Robust {
 
   /// Like filter.update; where R was raised the innovation is that of the raised R. not_positive_definite where
   /// no factor would do, as for R = 0.
-  template <MeasurementModel H>
-  auto update(Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
+  template <class H, class V = typename H::Measurement>
+    requires(MeasurementModel<H> || detail::explain_sizes<H>)
+  auto update(Gaussian<typename H::State>& belief, const H& sensor, const V& z) const {
     using S = ScalarOf<typename H::State>;
     constexpr int m = dof<typename H::Measurement>;
     const Gaussian<typename H::State> before = belief;
@@ -79,7 +82,8 @@ struct Robust {
     }
     const bool judged = innovation.accepted() || innovation.status == Status::gated;
     if (!judged || !(innovation.nis > static_cast<S>(limit))) return innovation;
-    const Matrix<m, m, S> r = sensor.noise(before.mean);
+    const detail::PlainSensor plain(sensor, detail::common_size(before.mean, before.covariance), z);
+    const Matrix<m, m, S> r = detail::dense_of(plain.noise(before.mean));
     const auto nis = [&](double factor) {
       const Matrix<m, m, S> s = innovation.covariance + static_cast<S>(factor - 1.0) * r;
       return static_cast<double>(detail::squared_mahalanobis<m, S>(innovation.residual, s));
@@ -112,22 +116,22 @@ template <MeasurementModel H>
 
 /// Repeats the update with R / weight(t) until t, of the residual after it, no longer changes the weight
 /// (expectation-maximisation, or iteratively reweighted least squares: the posterior rises at every round).
-template <class Filter, MeasurementModel H, class Weight>
-auto reweighted_update(const Filter& filter, Gaussian<typename H::State>& belief, const H& sensor,
-                       const typename H::Measurement& z, const Weight& weight) {
-  using Z = typename H::Measurement;
+template <class Filter, MeasurementModel H, class V, class Weight>
+auto reweighted_update(const Filter& filter, Gaussian<typename H::State>& belief, const H& sensor, const V& z,
+                       const Weight& weight) {
   using S = ScalarOf<typename H::State>;
-  constexpr int m = dof<Z>;
+  constexpr int m = dof<typename H::Measurement>;
+  const PlainSensor plain(sensor, common_size(belief.mean, belief.covariance), z);
   const Gaussian<typename H::State> before = belief;
   const auto residual_size = [&](const Gaussian<typename H::State>& updated) {
-    const Vector<m, S> r = local(Z(sensor.predict(updated.mean)), z);
-    const Matrix<m, m, S> noise = sensor.noise(updated.mean);
+    const Vector<m, S> r = plain.residual(updated.mean);
+    const Matrix<m, m, S> noise = dense_of(plain.noise(updated.mean));
     using std::sqrt;
     return sqrt(static_cast<double>(squared_mahalanobis<m, S>(r, noise)));
   };
   auto innovation = filter.update(belief, sensor, z);
   if (!innovation.accepted()) return innovation;
-  if (const Matrix<m, m, S> r = sensor.noise(before.mean); !is_regular_noise<m, S>(r)) {
+  if (const Matrix<m, m, S> r = dense_of(plain.noise(before.mean)); !is_regular_noise<m, S>(r)) {
     belief = before;
     innovation.status = Status::not_positive_definite;
     return innovation;
@@ -162,8 +166,9 @@ struct Huber {
   double threshold = 1.345;  ///< residual in standard deviations beyond which it counts linearly; > 0
 
   /// Like filter.update; the innovation and the covariance are those of the weighed R.
-  template <MeasurementModel H>
-  auto update(Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
+  template <class H, class V = typename H::Measurement>
+    requires(MeasurementModel<H> || detail::explain_sizes<H>)
+  auto update(Gaussian<typename H::State>& belief, const H& sensor, const V& z) const {
     if (!(threshold > 0.0)) return detail::refused_as<H>(Status::bad_option);
     const auto weight = [&](double t) { return t > threshold ? threshold / t : 1.0; };
     return detail::reweighted_update(filter, belief, sensor, z, weight);
@@ -177,10 +182,11 @@ struct StudentT {
   double degrees = 4.0;  ///< of freedom, dof above; small for heavy tails; > 0
 
   /// Like filter.update; the innovation and the covariance are those of the weighed R.
-  template <MeasurementModel H>
-  auto update(Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
+  template <class H, class V = typename H::Measurement>
+    requires(MeasurementModel<H> || detail::explain_sizes<H>)
+  auto update(Gaussian<typename H::State>& belief, const H& sensor, const V& z) const {
     if (!(degrees > 0.0)) return detail::refused_as<H>(Status::bad_option);
-    const int m = dof_of(z);
+    const int m = dof_of(detail::Given<typename H::Measurement, V>(z).value());
     const auto weight = [&](double t) { return (degrees + m) / (degrees + t * t); };
     return detail::reweighted_update(filter, belief, sensor, z, weight);
   }
@@ -188,15 +194,19 @@ struct StudentT {
 
 /// R after one more measurement: (1 - rate) R + rate (r r^T + H P H^T), r = z - h(x) with the updated belief.
 /// 0 < rate < 1; about 1 / rate measurements count.
-template <LinearisedMeasurement H>
+template <class H, class V = typename H::Measurement>
+  requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
 [[nodiscard]] CovarianceOf<typename H::Measurement> adapted_noise(
     const CovarianceOf<typename H::Measurement>& r, const Gaussian<typename H::State>& updated,
-    const H& sensor, const typename H::Measurement& z, double rate) {
+    const H& sensor, const V& z, double rate) {
   using S = ScalarOf<typename H::State>;
   using Z = typename H::Measurement;
   CAIRN_EXPECTS(rate > 0.0 && rate < 1.0, "adapted_noise needs a rate between 0 and 1");
-  const Matrix<dof<Z>, dof<typename H::State>, S> h = detail::dense_of(sensor.jacobian(updated.mean));
-  const Tangent<Z> left = local(Z(sensor.predict(updated.mean)), z);
+  const detail::PlainSensor plain(sensor, detail::common_size(updated.mean, updated.covariance), z);
+  const Matrix<dof<Z>, dof<typename H::State>, S> h = detail::dense_of(plain.jacobian(updated.mean));
+  const Tangent<Z> left = plain.residual(updated.mean);
+  CAIRN_EXPECTS(!plain.misfit() && detail::has_size(r, plain.numbers(), plain.numbers()),
+                "adapted_noise needs a noise, a belief, a sensor and a measurement whose sizes fit");
   const CovarianceOf<Z> seen = left * left.transpose() + h * updated.covariance * h.transpose();
   return symmetrised(static_cast<S>(1.0 - rate) * r + static_cast<S>(rate) * seen);
 }
@@ -208,6 +218,9 @@ template <int M, class S>
 [[nodiscard]] Matrix<M, M, S> innovated_noise(const Matrix<M, M, S>& r, const Innovation<M, S>& innovation,
                                               double rate) {
   CAIRN_EXPECTS(rate > 0.0 && rate < 1.0, "innovated_noise needs a rate between 0 and 1");
+  CAIRN_EXPECTS(detail::has_size(r, innovation.residual.size(), innovation.residual.size()) &&
+                    detail::has_size(innovation.covariance, r.rows(), r.cols()),
+                "innovated_noise needs a noise of the innovation's size");
   const Matrix<M, M, S> change =
       innovation.residual * innovation.residual.transpose() - innovation.covariance;
   if (!all_finite(change)) return r;

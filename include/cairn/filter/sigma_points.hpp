@@ -21,6 +21,7 @@
 #include <limits>
 #include <type_traits>
 
+#include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kernels.hpp>
@@ -199,11 +200,14 @@ template <int M, int N, class S, class Array>
 template <Manifold X, class F>
 [[nodiscard]] auto unscented_transform(const Gaussian<X>& belief, const F& f,
                                        const SigmaPoints& points = {}) {
+  CAIRN_EXPECTS(detail::common_size(belief.mean, belief.covariance) > 0,
+                "unscented_transform needs a covariance of the mean's size");
   const CovarianceOf<X> root = detail::semi_definite_root<dof<X>, ScalarOf<X>>(belief.covariance);
-  const auto out =
-      detail::unscented_transform(belief.mean, root, f, points.spread_squared(static_cast<int>(root.rows())),
-                                  points.beta - points.alpha * points.alpha);
-  return Gaussian<std::decay_t<decltype(f(belief.mean))>>{out.mean, out.covariance};
+  const auto sent = [&](const X& x) { return detail::evaluated(f(x)); };
+  const auto out = detail::unscented_transform(belief.mean, root, sent,
+                                               points.spread_squared(static_cast<int>(root.rows())),
+                                               points.beta - points.alpha * points.alpha);
+  return Gaussian<decltype(sent(belief.mean))>{out.mean, out.covariance};
 }
 
 }  // namespace cairn::inline CAIRN_ABI

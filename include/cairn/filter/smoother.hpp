@@ -28,6 +28,7 @@
 #include <optional>
 #include <vector>
 
+#include <cairn/core/check.hpp>
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/array_update.hpp>
@@ -36,6 +37,7 @@
 #include <cairn/filter/kalman.hpp>
 #include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/sigma_points.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/filter/unscented.hpp>
@@ -92,21 +94,30 @@ void record_rows(RecordedStep<X>& step, const CovarianceOf<X>& root, Array& arra
     }
 }
 
+/// All of one size, as those of a Recorder are.
+template <Manifold X>
+[[nodiscard]] bool fits_together(const RecordedStep<X>& step, const Gaussian<X>& after) {
+  const int n = common_size(step.before.mean, step.before.covariance);
+  return n > 0 && common_size(step.predicted.mean, step.predicted.covariance) == n &&
+         common_size(after.mean, after.covariance) == n && has_size(step.gain, n, n) &&
+         has_size(step.given_after, n, n);
+}
+
 /// The step that led from `before` to `predicted`.
-template <class Filter, class F>
+template <class Filter, class F, class U>
 [[nodiscard]] RecordedStep<typename F::State> record_step(const Filter& filter,
                                                           const Gaussian<typename F::State>& before,
                                                           const Gaussian<typename F::State>& predicted,
-                                                          const F& process, const typename F::Control& u,
-                                                          double dt) {
+                                                          const F& process, const U& u, double dt) {
   using X = typename F::State;
   using S = ScalarOf<X>;
   using std::sqrt;
   constexpr int n = dof<X>;
+  const PlainProcess plain(process, common_size(before.mean, before.covariance), u);
   const CovarianceOf<X> root = semi_definite_root<n, S>(before.covariance);
   const int ns = static_cast<int>(root.rows());
   RecordedStep<X> step{before, predicted, root, root};
-  CovarianceOf<X> q = process.noise(before.mean, u, dt);
+  CovarianceOf<X> q = dense_of(plain.noise(before.mean, dt));
   double fading = 1.0;
   if constexpr (requires { filter.fading; }) {
     fading = filter.fading;
@@ -121,7 +132,7 @@ template <class Filter, class F>
   if constexpr (unscented) {
     const SigmaPoints& points = filter.points;
     Matrix<rows, size_sum<n, n>, S> sums = array;
-    const auto f = [&](const X& x) -> X { return process.propagate(x, u, dt); };
+    const auto f = [&](const X& x) -> X { return plain.propagate(x, dt); };
     static_cast<void>(sigma_rows(before.mean, root, f, points.spread_squared(ns),
                                  points.beta - points.alpha * points.alpha, sums));
     for (int j = 0; j < ns; ++j) {
@@ -133,7 +144,7 @@ template <class Filter, class F>
       array(4 * ns, j) = finite(last) ? last : S(0);  // a negative square, which no root has
     }
   } else {
-    const CovarianceOf<X> jacobian = dense_of(process.jacobian(before.mean, u, dt));
+    const CovarianceOf<X> jacobian = dense_of(plain.jacobian(before.mean, dt));
     put_transposed(array, 0, 0, column_product(jacobian, root));
   }
   for (int j = 0; j < ns; ++j)
@@ -152,6 +163,7 @@ template <class Filter, class F>
 /// squares, and one however little was left.
 template <Manifold X>
 [[nodiscard]] Gaussian<X> smooth_back(const RecordedStep<X>& step, const Gaussian<X>& after) {
+  CAIRN_EXPECTS(detail::fits_together(step, after), "smooth_back needs beliefs of one size");
   using S = ScalarOf<X>;
   constexpr int n = dof<X>;
   const Tangent<X> correction =
@@ -167,22 +179,24 @@ class Recorder {
 public:
   Recorder(const Filter& filter, const Gaussian<X>& prior) : filter_(filter), belief_(prior) {}
 
-  template <ProcessModel F>
-  Status predict(const F& process, const typename F::Control& control, double dt) {
+  template <class F, class U = typename F::Control>
+    requires(ProcessModel<F> || detail::explain_sizes<F>)
+  Status predict(const F& process, const U& control, double dt) {
     const Gaussian<X> before = belief_;
     const Status status = filter_.predict(belief_, process, control, dt);
     if (status == Status::accepted)
       steps_.push_back(detail::record_step(filter_, before, belief_, process, control, dt));
     return status;
   }
-  template <ProcessModel F>
-    requires std::same_as<typename F::Control, NoControl>
+  template <class F>
+    requires(ProcessModel<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
   Status predict(const F& process, double dt) {
     return predict(process, NoControl{}, dt);
   }
 
-  template <MeasurementModel H>
-  auto update(const H& sensor, const typename H::Measurement& z) {
+  template <class H, class V = typename H::Measurement>
+    requires(MeasurementModel<H> || detail::explain_sizes<H>)
+  auto update(const H& sensor, const V& z) {
     return filter_.update(belief_, sensor, z);
   }
 

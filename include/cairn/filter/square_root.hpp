@@ -26,6 +26,7 @@
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/sigma_points.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
@@ -41,6 +42,8 @@ struct SquareRootGaussian {
 
   /// Throws Error where the covariance is none.
   [[nodiscard]] static SquareRootGaussian from(const Gaussian<X>& belief) {
+    CAIRN_EXPECTS(detail::common_size(belief.mean, belief.covariance) > 0,
+                  "SquareRootGaussian::from needs a covariance of the mean's size");
     SquareRootGaussian result{belief.mean, belief.covariance};
     if (!detail::checked_root<dof<X>, ScalarOf<X>>(belief.covariance, result.root))
       raise("SquareRootGaussian: the covariance is not finite and positive semi-definite");
@@ -102,18 +105,22 @@ struct SquareRoot {
   double fading = 1.0;             ///< fading memory: the propagated P is multiplied by this; >= 1
   double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
 
-  template <LinearisedProcess F>
-  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process,
-                 const typename F::Control& control, double dt) const {
+  template <class F, class U = typename F::Control>
+    requires(LinearisedProcess<F> || detail::explain_sizes<F>)
+  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, const U& control,
+                 double dt) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
     using std::sqrt;
     constexpr int n = dof<X>;
     if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
-    const int size = static_cast<int>(belief.root.rows());
-    const CovarianceOf<X> f = detail::dense_of(process.jacobian(belief.mean, control, dt));
-    CovarianceOf<X> q = process.noise(belief.mean, control, dt);
-    if (f.cols() != size || f.rows() != size || q.rows() != size) return Status::size_mismatch;
+    const int size = detail::common_size(belief.mean, belief.root);
+    const detail::PlainProcess plain(process, size, control);
+    const CovarianceOf<X> f = detail::dense_of(plain.jacobian(belief.mean, dt));
+    CovarianceOf<X> q = detail::dense_of(plain.noise(belief.mean, dt));
+    if (plain.misfit()) return Status::size_mismatch;
+    const X mean = plain.propagate(belief.mean, dt);
+    if (plain.misfit()) return Status::size_mismatch;
     const Status status = detail::stabilise<X>(q, fading, stabilising_noise);
     if (status != Status::accepted) return status;
     Matrix<detail::size_sum<n, n>, n, S> array(2 * size, size);
@@ -122,33 +129,31 @@ struct SquareRoot {
     detail::put_transposed(array, 0, 0, moved);
     detail::put_transposed(array, size, 0, detail::semi_definite_root<n, S>(q));
     detail::triangularise(array);
-    return detail::keep_root(belief, X(process.propagate(belief.mean, control, dt)), array, size);
+    return detail::keep_root(belief, mean, array, size);
   }
-  template <LinearisedProcess F>
-    requires std::same_as<typename F::Control, NoControl>
+  template <class F>
+    requires(LinearisedProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
   Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, double dt) const {
     return predict(belief, process, NoControl{}, dt);
   }
 
-  template <LinearisedMeasurement H>
+  template <class H, class V = typename H::Measurement>
+    requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
-      SquareRootGaussian<typename H::State>& belief, const H& sensor,
-      const typename H::Measurement& z) const {
+      SquareRootGaussian<typename H::State>& belief, const H& sensor, const V& z) const {
     using X = typename H::State;
     using Z = typename H::Measurement;
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
     constexpr int m = dof<Z>;
-    const Vector<m, S> residual = local(Z(sensor.predict(belief.mean)), z);
-    const Matrix<m, n, S> h = detail::dense_of(sensor.jacobian(belief.mean));
-    const Matrix<m, m, S> r = sensor.noise(belief.mean);
-    const int ms = static_cast<int>(residual.size());
-    const int ns = static_cast<int>(belief.root.rows());
-    if (h.rows() != ms || h.cols() != ns || r.rows() != ms) {
-      auto in = detail::fresh_innovation<m, S>(residual, r);
-      in.status = Status::size_mismatch;
-      return in;
-    }
+    const int ns = detail::common_size(belief.mean, belief.root);
+    const detail::PlainSensor plain(sensor, ns, z);
+    const int ms = plain.numbers();
+    const Matrix<m, n, S> h = detail::dense_of(plain.jacobian(belief.mean));
+    const Matrix<m, m, S> r = detail::dense_of(plain.noise(belief.mean));
+    if (plain.misfit()) return detail::misfitting(plain);
+    const Vector<m, S> residual = plain.residual(belief.mean);
+    if (plain.misfit()) return detail::misfitting(plain);
     Matrix<detail::size_sum<m, n>, detail::size_sum<m, n>, S> array(ms + ns, ms + ns);
     array.setZero();
     Matrix<m, m, S> root_r = r;
@@ -169,23 +174,28 @@ struct SquareRootUnscented {
   double fading = 1.0;             ///< fading memory: the propagated P is multiplied by this; >= 1
   double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
 
-  template <ProcessModel F>
-  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process,
-                 const typename F::Control& control, double dt) const {
+  template <class F, class U = typename F::Control>
+    requires(ProcessModel<F> || detail::explain_sizes<F>)
+  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, const U& control,
+                 double dt) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
     using std::sqrt;
     constexpr int n = dof<X>;
     if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
-    const int size = static_cast<int>(belief.root.rows());
+    const int size = detail::common_size(belief.mean, belief.root);
+    const detail::PlainProcess plain(process, size, control);
+    if (plain.misfit()) return Status::size_mismatch;
     if (!sound(size)) return Status::bad_option;
-    CovarianceOf<X> q = process.noise(belief.mean, control, dt);
+    CovarianceOf<X> q = detail::dense_of(plain.noise(belief.mean, dt));
+    if (plain.misfit()) return Status::size_mismatch;
     const Status status = detail::stabilise<X>(q, fading, stabilising_noise);
     if (status != Status::accepted) return status;
     constexpr int rows = n == dynamic ? dynamic : 3 * n + 1;
     Matrix<rows, n, S> array(3 * size + 1, size);
-    const auto f = [&](const X& x) -> X { return process.propagate(x, control, dt); };
+    const auto f = [&](const X& x) -> X { return plain.propagate(x, dt); };
     const X mean = spread(belief, f, array);
+    if (plain.misfit()) return Status::size_mismatch;
     const S faded = sqrt(static_cast<S>(fading));
     for (int j = 0; j < size; ++j)
       for (int i = 0; i <= 2 * size; ++i) array(i, j) *= faded;
@@ -193,29 +203,32 @@ struct SquareRootUnscented {
     detail::triangularise(array);
     return detail::keep_root(belief, mean, array, size);
   }
-  template <ProcessModel F>
-    requires std::same_as<typename F::Control, NoControl>
+  template <class F>
+    requires(ProcessModel<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
   Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, double dt) const {
     return predict(belief, process, NoControl{}, dt);
   }
 
-  template <MeasurementModel H>
+  template <class H, class V = typename H::Measurement>
+    requires(MeasurementModel<H> || detail::explain_sizes<H>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
-      SquareRootGaussian<typename H::State>& belief, const H& sensor,
-      const typename H::Measurement& z) const {
+      SquareRootGaussian<typename H::State>& belief, const H& sensor, const V& z) const {
     using X = typename H::State;
     using Z = typename H::Measurement;
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
     constexpr int m = dof<Z>;
-    const Matrix<m, m, S> r = sensor.noise(belief.mean);
-    const int ns = static_cast<int>(belief.root.rows());
-    const int ms = static_cast<int>(r.rows());
+    const int ns = detail::common_size(belief.mean, belief.root);
+    const detail::PlainSensor plain(sensor, ns, z);
+    const int ms = plain.numbers();
+    const Matrix<m, m, S> r = detail::dense_of(plain.noise(belief.mean));
+    if (plain.misfit()) return detail::misfitting(plain);
     constexpr int rows = n == dynamic || m == dynamic ? dynamic : 2 * n + 1 + m;
     Matrix<rows, detail::size_sum<m, n>, S> array(2 * ns + 1 + ms, ms + ns);
     array.setZero();
-    const auto h = [&](const X& x) -> Z { return sensor.predict(x); };
+    const auto h = [&](const X& x) -> Z { return plain.predict(x); };
     const Z mean = spread(belief, h, array);
+    if (plain.misfit()) return detail::misfitting(plain);
     Matrix<m, m, S> root_r = r;
     const bool good = detail::checked_root<m, S>(r, root_r);
     detail::put_transposed(array, 0, ms, belief.root);
@@ -230,7 +243,7 @@ struct SquareRootUnscented {
     const S digits = detail::digits_of_points(
         belief.mean, [&](int i, int) { return variances(ms + i); }, mean,
         [&](int i, int) { return variances(i); });
-    return detail::correct_by_array<X, m>(belief, array, local(mean, z), slope, r, sound(ns) ? gate : 0.0, good,
+    return detail::correct_by_array<X, m>(belief, array, local(mean, plain.z()), slope, r, sound(ns) ? gate : 0.0, good,
                                           digits);
   }
 

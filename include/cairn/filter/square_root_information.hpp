@@ -24,6 +24,7 @@
 #include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/correct.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
@@ -43,11 +44,12 @@ struct SquareRootInformation {
     const int n = dof_of(x);
     return {x, CovarianceOf<X>::Zero(n, n), Tangent<X>::Zero(n)};
   }
-  /// The same belief; nothing where the covariance is singular, or so nearly that its inverse would not have
-  /// three digits.
+  /// The same belief; nothing where the covariance is of another size or singular, or so nearly that its
+  /// inverse would not have three digits.
   [[nodiscard]] static std::optional<SquareRootInformation> from(const Gaussian<X>& belief) {
     using S = ScalarOf<X>;
-    const int n = dof_of(belief.mean);
+    const int n = detail::common_size(belief.mean, belief.covariance);
+    if (n == 0) return std::nullopt;
     CovarianceOf<X> lower = belief.covariance, inverse = lower;
     if (!detail::regular_root<dof<X>, S>(belief.covariance, lower)) return std::nullopt;
     const CovarianceOf<X> upper = transposed<dof<X>, dof<X>, S>(lower);
@@ -63,6 +65,7 @@ struct SquareRootInformation {
   }
   /// Mean and covariance; nothing while some direction has no information.
   [[nodiscard]] std::optional<Gaussian<X>> gaussian() const {
+    if (detail::common_size(point, root, vector) == 0) return std::nullopt;
     CovarianceOf<X> inverse = root;
     Tangent<X> d = vector;
     if (!solve(inverse, d)) return std::nullopt;
@@ -95,48 +98,53 @@ struct SquareRootInformationFilter {
 
   /// Moves the belief by one step of dt, and the point of linearisation to the estimate before, where there
   /// is one. Refused: a singular F. O(n^3).
-  template <LinearisedProcess F>
-  Status predict(SquareRootInformation<typename F::State>& belief, const F& process,
-                 const typename F::Control& control, double dt) const {
+  template <class F, class U = typename F::Control>
+    requires(LinearisedProcess<F> || detail::explain_sizes<F>)
+  Status predict(SquareRootInformation<typename F::State>& belief, const F& process, const U& control,
+                 double dt) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
     if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
+    const int size = detail::common_size(belief.point, belief.root, belief.vector);
+    const detail::PlainProcess plain(process, size, control);
+    if (plain.misfit()) return Status::size_mismatch;
     SquareRootInformation<X> next = belief;
     recentre(next);
-    const int size = static_cast<int>(next.vector.size());
-    CovarianceOf<X> f = detail::dense_of(process.jacobian(next.point, control, dt));
-    CovarianceOf<X> q = process.noise(next.point, control, dt);
-    if (f.rows() != size || f.cols() != size || q.rows() != size) return Status::size_mismatch;
+    CovarianceOf<X> f = detail::dense_of(plain.jacobian(next.point, dt));
+    CovarianceOf<X> q = detail::dense_of(plain.noise(next.point, dt));
+    if (plain.misfit()) return Status::size_mismatch;
     if (!all_finite(f)) return Status::not_finite;
     const Status status = detail::stabilise<X>(q, fading, stabilising_noise);
     if (status != Status::accepted) return status;
     const Status moved = detail::predict_root<n, S>(next.root, next.vector, f, q, fading);
     if (moved != Status::accepted) return moved;
-    next.point = process.propagate(next.point, control, dt);
+    next.point = plain.propagate(next.point, dt);
+    if (plain.misfit()) return Status::size_mismatch;
     return keep(belief, next);
   }
-  template <LinearisedProcess F>
-    requires std::same_as<typename F::Control, NoControl>
+  template <class F>
+    requires(LinearisedProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
   Status predict(SquareRootInformation<typename F::State>& belief, const F& process, double dt) const {
     return predict(belief, process, NoControl{}, dt);
   }
 
   /// Adds the information of the measurement z, linearised at the belief's point. O((n + m) n^2).
-  template <LinearisedMeasurement H>
-  Status update(SquareRootInformation<typename H::State>& belief, const H& sensor,
-                const typename H::Measurement& z) const {
+  template <class H, class V = typename H::Measurement>
+    requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
+  Status update(SquareRootInformation<typename H::State>& belief, const H& sensor, const V& z) const {
     using X = typename H::State;
-    using Z = typename H::Measurement;
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
-    constexpr int m = dof<Z>;
-    const Matrix<m, n, S> h = detail::dense_of(sensor.jacobian(belief.point));
-    const Matrix<m, m, S> v = sensor.noise(belief.point);
-    const Vector<m, S> residual = local(Z(sensor.predict(belief.point)), z);
-    const int ns = static_cast<int>(belief.vector.size());
-    const int ms = static_cast<int>(residual.size());
-    if (h.cols() != ns || h.rows() != ms || v.rows() != ms) return Status::size_mismatch;
+    constexpr int m = dof<typename H::Measurement>;
+    const int ns = detail::common_size(belief.point, belief.root, belief.vector);
+    const detail::PlainSensor plain(sensor, ns, z);
+    const int ms = plain.numbers();
+    const Matrix<m, n, S> h = detail::dense_of(plain.jacobian(belief.point));
+    const Matrix<m, m, S> v = detail::dense_of(plain.noise(belief.point));
+    if (plain.misfit()) return Status::size_mismatch;
+    const Vector<m, S> residual = plain.residual(belief.point);
+    if (plain.misfit()) return Status::size_mismatch;
     if (!all_finite(v) || !all_finite(h)) return Status::not_finite;
     constexpr int rows = detail::size_sum<n, m>;
     Matrix<rows, detail::size_sum<n, 1>, S> array(ns + ms, ns + 1);
@@ -167,6 +175,7 @@ struct SquareRootInformationFilter {
   /// Moves the point of linearisation to the mean; false, and nothing changed, while that is unknown.
   template <Manifold X>
   static bool recentre(SquareRootInformation<X>& belief) {
+    if (detail::common_size(belief.point, belief.root, belief.vector) == 0) return false;
     CovarianceOf<X> inverse = belief.root;
     Tangent<X> d = belief.vector;
     if (!belief.solve(inverse, d) || !all_finite(d)) return false;

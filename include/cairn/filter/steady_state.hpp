@@ -15,6 +15,7 @@
 #pragma once
 
 #include <cmath>
+#include <concepts>
 #include <limits>
 
 #include <cairn/core/cholesky.hpp>
@@ -24,6 +25,7 @@
 #include <cairn/filter/correct.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/information.hpp>
+#include <cairn/filter/matrix_of.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
@@ -85,7 +87,8 @@ template <int N, int M, class S>
     result.status = status;
     return result;
   };
-  if (f.cols() != n || h.cols() != n || q.rows() != n || q.cols() != n || r.rows() != m || r.cols() != m)
+  if (n == 0 || m == 0 || f.cols() != n || h.cols() != n || q.rows() != n || q.cols() != n || r.rows() != m ||
+      r.cols() != m)
     return refused(Status::size_mismatch);
   if (!all_finite(f) || !all_finite(h) || !all_finite(r)) return refused(Status::not_finite);
   const Status noise = detail::judge_noise<N, S>(q);
@@ -142,6 +145,36 @@ template <int N, int M, class S>
         return refused(Status::not_converged);
     }
   return result;
+}
+
+namespace detail {
+
+/// Of sizes that have to be equal, the first that is known when compiled.
+[[nodiscard]] constexpr int known_size(int a, int b, int c = dynamic, int d = dynamic) {
+  return a != dynamic ? a : b != dynamic ? b : c != dynamic ? c : d;
+}
+
+}  // namespace detail
+
+/// The same for anything that stands for the four matrices.
+template <class F, class H, class Q, class R, class S = typename detail::ShapeOf<F>::Scalar,
+          int N = detail::known_size(detail::ShapeOf<F>::rows, detail::ShapeOf<F>::columns,
+                                     detail::ShapeOf<Q>::rows, detail::ShapeOf<H>::columns),
+          int M = detail::known_size(detail::ShapeOf<H>::rows, detail::ShapeOf<R>::rows,
+                                     detail::ShapeOf<R>::columns)>
+  requires MatrixOf<F, N, N, S> && MatrixOf<H, M, N, S> && MatrixOf<Q, N, N, S> && MatrixOf<R, M, M, S> &&
+           (!std::same_as<F, Matrix<N, N, S>> || !std::same_as<H, Matrix<M, N, S>> ||
+            !std::same_as<Q, Matrix<N, N, S>> || !std::same_as<R, Matrix<M, M, S>>)
+[[nodiscard]] SteadyState<N, M, S> steady_state(const F& f, const H& h, const Q& q, const R& r) {
+  const Eigen::Index n = N != dynamic ? N : f.rows();
+  const Eigen::Index m = M != dynamic ? M : h.rows();
+  bool misfit = false;
+  const Matrix<N, N, S> plain_f = detail::plain_matrix<N, N, S>(f, n, n, misfit);
+  const Matrix<M, N, S> plain_h = detail::plain_matrix<M, N, S>(h, m, n, misfit);
+  const Matrix<N, N, S> plain_q = detail::plain_matrix<N, N, S>(q, n, n, misfit);
+  const Matrix<M, M, S> plain_r = detail::plain_matrix<M, M, S>(r, m, m, misfit);
+  if (misfit) return {plain_q, plain_q, Matrix<N, M, S>::Zero(n, m), Status::size_mismatch};
+  return steady_state(plain_f, plain_h, plain_q, plain_r);
 }
 
 }  // namespace cairn::inline CAIRN_ABI

@@ -30,13 +30,16 @@
 #include <cairn/core/check.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn::inline CAIRN_ABI {
 
 /// A belief in time under one process and the sensors H. Allocates; not safe for concurrent use.
-template <class Filter, ProcessModel F, MeasurementModel... H>
+template <class Filter, class F, class... H>
+  requires(ProcessModel<F> || detail::explain_sizes<F>) &&
+          ((MeasurementModel<H> || detail::explain_sizes<H>) && ...)
 class Timeline {
 public:
   using State = typename F::State;
@@ -50,25 +53,36 @@ public:
   }
 
   /// The control is u from `time` until the next such event. Refused: as measure(), or where a prediction is.
-  Status steer(const Control& u, double time) { return insert(Event({time, u, base_.after}, Steering{})); }
+  template <class U = Control>
+  Status steer(const U& u, double time) {
+    const detail::Given<Control, U> given(u);
+    if (given.misfit()) return Status::size_mismatch;
+    if constexpr (requires { requires Control::SizeAtCompileTime == dynamic; }) {
+      Gaussian<State> here = base_.after;  // what the process says of its size, before it is remembered
+      const Status status = filter_.predict(here, process_, given.value(), 0.0);
+      if (status == Status::size_mismatch) return status;
+    }
+    return insert(Event({time, given.value(), base_.after}, Steering{}));
+  }
 
   /// Takes in z of `time` and repeats what came after. Refused, and nothing changed: too_old before the
   /// horizon, and what the filter refuses at that moment. A gated measurement is remembered: what comes later
   /// for an earlier moment may let it in.
-  template <class Sensor>
+  template <class Sensor, class V = typename Sensor::Measurement>
     requires(std::same_as<Sensor, H> || ...)
-  Innovation<dof<typename Sensor::Measurement>, ScalarOf<State>> measure(
-      const Sensor& sensor, const typename Sensor::Measurement& z, double time) {
+  Innovation<dof<typename Sensor::Measurement>, ScalarOf<State>> measure(const Sensor& sensor, const V& z,
+                                                                         double time) {
     Innovation<dof<typename Sensor::Measurement>, ScalarOf<State>> innovation;
-    innovation.status = accepts(time);
+    const detail::Given<typename Sensor::Measurement, V> given(z);
+    innovation.status = given.misfit() ? Status::size_mismatch : accepts(time);
     if (innovation.status != Status::accepted) return innovation;
     const Moment& last = before(place(time));
     Moment now{time, last.control, last.after};
     innovation.status = advance(now, last.time);
     if (innovation.status != Status::accepted) return innovation;
-    innovation = filter_.update(now.after, sensor, z);
+    innovation = filter_.update(now.after, sensor, given.value());
     if (!innovation.accepted() && innovation.status != Status::gated) return innovation;
-    const Status status = insert(Event(now, Sighting<Sensor>{sensor, z}));
+    const Status status = insert(Event(now, Sighting<Sensor>{sensor, given.value()}));
     if (status != Status::accepted) innovation.status = status;
     return innovation;
   }

@@ -21,6 +21,7 @@
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
+#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/filter/ud_kernels.hpp>
 #include <cairn/version.hpp>
@@ -58,26 +59,29 @@ UDGaussian<X> UDGaussian<X>::from(const Gaussian<X>& belief) {
 struct UDFilter {
   double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
 
-  template <LinearisedProcess F>
-  Status predict(UDGaussian<typename F::State>& belief, const F& process, const typename F::Control& control,
-                 double dt) const {
+  template <class F, class U = typename F::Control>
+    requires(LinearisedProcess<F> || detail::explain_sizes<F>)
+  Status predict(UDGaussian<typename F::State>& belief, const F& process, const U& control, double dt) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
     if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
-    using Jacobian = std::decay_t<decltype(process.jacobian(belief.mean, control, dt))>;
+    const detail::PlainProcess plain(process, n, control);
+    using Jacobian = std::decay_t<decltype(plain.jacobian(belief.mean, dt))>;
     detail::Column<n, S> w[2 * n], u[n], fu[n];
     S weights[2 * n];
-    const Status noise = factor_noise<n, S>(process.noise(belief.mean, control, dt), w, weights);
+    const Status noise = factor_noise<n, S>(plain.noise(belief.mean, dt), w, weights);
+    if (plain.misfit()) return Status::size_mismatch;
     if (noise != Status::accepted) return noise;
     detail::load_columns(belief.upper, u);
     detail::each<n>([&](int j) {
       fu[j].set_zero();
       weights[j] = belief.diagonal(j);
     });
-    detail::add_product<detail::ProductRows::all>(process.jacobian(belief.mean, control, dt), u, fu);
+    detail::add_product<detail::ProductRows::all>(plain.jacobian(belief.mean, dt), u, fu);
     detail::each<n>([&](int j) { w[j] = fu[j]; });
-    const X mean = process.propagate(belief.mean, control, dt);
+    const X mean = plain.propagate(belief.mean, dt);
+    if (plain.misfit()) return Status::size_mismatch;
     detail::Column<n, S> d;
     detail::weighted_gram_schmidt<detail::upper_triangular<Jacobian>(), n, S>(w, weights, u, d);
     if (!finite(u, d) || !detail::finite_state(mean)) [[unlikely]]
@@ -86,23 +90,26 @@ struct UDFilter {
     keep(belief, u, d);
     return Status::accepted;
   }
-  template <LinearisedProcess F>
-    requires std::same_as<typename F::Control, NoControl>
+  template <class F>
+    requires(LinearisedProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
   Status predict(UDGaussian<typename F::State>& belief, const F& process, double dt) const {
     return predict(belief, process, NoControl{}, dt);
   }
 
-  template <LinearisedMeasurement H>
+  template <class H, class V = typename H::Measurement>
+    requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
-      UDGaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
+      UDGaussian<typename H::State>& belief, const H& sensor, const V& z) const {
     using X = typename H::State;
-    using Z = typename H::Measurement;
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
-    constexpr int m = dof<Z>;
-    const Matrix<m, m, S> r = detail::dense_of(sensor.noise(belief.mean));
-    const auto jacobian = sensor.jacobian(belief.mean);
-    Innovation<m, S> in = detail::fresh_innovation<m, S>(local(Z(sensor.predict(belief.mean)), z), r);
+    constexpr int m = dof<typename H::Measurement>;
+    static_assert(m != dynamic, "the UD form takes measurements of fixed size");
+    const detail::PlainSensor plain(sensor, n, z);
+    const Matrix<m, m, S> r = detail::dense_of(plain.noise(belief.mean));
+    const auto jacobian = plain.jacobian(belief.mean);
+    Innovation<m, S> in = detail::fresh_innovation<m, S>(plain.residual(belief.mean), r);
+    if (plain.misfit()) return detail::misfitting(plain);
     detail::Column<n, S> u[n], d, step;
     detail::load_columns(belief.upper, u);
     d.load(belief.diagonal.data());

@@ -115,66 +115,71 @@ struct Unscented {
   double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
 
   /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite, a P that is no covariance.
-  template <ProcessModel F>
-  Status predict(Gaussian<typename F::State>& belief, const F& process, const typename F::Control& control,
-                 double dt) const {
-    using X = typename F::State;
+  template <class F, class U = typename F::Control>
+    requires(ProcessModel<F> || detail::explain_sizes<F>)
+  Status predict(Gaussian<typename F::State>& belief, const F& process, const U& control, double dt) const {
     if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
-    const int n = dof_of(belief.mean);
-    if (belief.covariance.rows() != n) return Status::size_mismatch;
+    const int n = detail::common_size(belief.mean, belief.covariance);
+    const detail::PlainProcess plain(process, n, control);
+    if (plain.misfit()) return Status::size_mismatch;
     const double c2 = points.spread_squared(n);
     if (!(fading >= 1.0) || !(stabilising_noise >= 0.0) || !(c2 > 0.0)) return Status::bad_option;
-    const auto f = [&](const auto& x) { return process.propagate(x, control, dt); };
+    const auto f = [&](const auto& x) { return plain.propagate(x, dt); };
     const detail::PointFunction<detail::is_wide<F>, decltype(f)> points_to{f};
-    if constexpr (dof<X> == dynamic)
-      return advance(belief, points_to, CovarianceOf<X>(process.noise(belief.mean, control, dt)), c2);
-    else
-      return advance(belief, points_to, process.noise(belief.mean, control, dt), c2);
+    decltype(auto) q = plain.noise(belief.mean, dt);
+    if (plain.misfit()) return Status::size_mismatch;
+    return advance(belief, plain, points_to, q, c2);
   }
-  template <ProcessModel F>
-    requires std::same_as<typename F::Control, NoControl>
+  template <class F>
+    requires(ProcessModel<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
   Status predict(Gaussian<typename F::State>& belief, const F& process, double dt) const {
     return predict(belief, process, NoControl{}, dt);
   }
 
   /// Takes in the measurement z, or refuses it and leaves the belief as it was.
-  template <MeasurementModel H>
+  template <class H, class V = typename H::Measurement>
+    requires(MeasurementModel<H> || detail::explain_sizes<H>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
-      Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z) const {
+      Gaussian<typename H::State>& belief, const H& sensor, const V& z) const {
     using X = typename H::State;
     using Z = typename H::Measurement;
     using S = ScalarOf<X>;
     constexpr int m = dof<Z>;
-    const double c2 = points.spread_squared(static_cast<int>(belief.covariance.rows()));
-    if (!(c2 > 0.0)) return refused(belief, sensor, z, Status::bad_option);
-    const auto f = [&](const auto& x) { return sensor.predict(x); };
+    const int size = detail::common_size(belief.mean, belief.covariance);
+    const detail::PlainSensor plain(sensor, size, z);
+    if (plain.misfit()) return detail::misfitting(plain);
+    const double c2 = points.spread_squared(size);
+    if (!(c2 > 0.0)) return refused(belief, plain, Status::bad_option);
+    const auto f = [&](const auto& x) { return plain.predict(x); };
     const detail::PointFunction<detail::is_wide<H>, decltype(f)> h{f};
     if constexpr (dof<X> == dynamic || m == dynamic) {
       CovarianceOf<X> root = belief.covariance;
       if (!detail::checked_root<dof<X>, S>(belief.covariance, root))
-        return refused(belief, sensor, z, refusal<X>(belief));
+        return refused(belief, plain, refusal<X>(belief));
       const auto out = detail::unscented_transform(
-          belief.mean, root, [&](const X& x) -> Z { return sensor.predict(x); }, c2, beta_minus_alpha2());
-      auto in = detail::fresh_innovation<m, S>(local(out.mean, z), out.covariance);
-      const Matrix<m, m, S> r = sensor.noise(belief.mean);
+          belief.mean, root, [&](const X& x) -> Z { return plain.predict(x); }, c2, beta_minus_alpha2());
+      const Matrix<m, m, S> r = detail::dense_of(plain.noise(belief.mean));
+      if (plain.misfit()) return detail::misfitting(plain);
+      auto in = detail::fresh_innovation<m, S>(local(out.mean, plain.z()), out.covariance);
       in.covariance += r;
       const S digits = detail::digits_of_points(belief.mean, belief.covariance, out.mean, in.covariance);
       detail::correct_by_moments<X, m, S>(belief, out.cross, in, gate, digits,
-                                          by_array(belief, sensor, r, in, c2, digits));
+                                          by_array(belief, plain, r, in, c2, digits));
       return in;
     } else {
       constexpr int n = dof<X>;
       detail::Column<n, S> root[n];
       if (!detail::covariance_root(belief.covariance, root)) [[unlikely]]
-        return refused(belief, sensor, z, refusal<X>(belief));
-      const Z center = sensor.predict(belief.mean);
+        return refused(belief, plain, refusal<X>(belief));
+      const Z center = plain.predict(belief.mean);
       auto moments = detail::sum_points<detail::Pairs::with_cross>(
           belief.mean, root, h, detail::spread<S>(c2), beta_minus_alpha2(), center);
       Tangent<Z> mean;
       moments.mean.store(mean.data());
       Innovation<m, S> in;
-      in.residual = local(Z(retract(center, mean)), z);
-      const Matrix<m, m, S> r = detail::dense_of(sensor.noise(belief.mean));
+      in.residual = local(Z(retract(center, mean)), plain.z());
+      const Matrix<m, m, S> r = detail::dense_of(plain.noise(belief.mean));
+      if (plain.misfit()) return detail::misfitting(plain);
       detail::each<m>([&](int b) __attribute__((always_inline)) {
         detail::each<m>(b, m, [&](int a) {
           in.covariance(a, b) = in.covariance(b, a) = moments.covariance[b][a] + r(a, b);
@@ -182,7 +187,7 @@ struct Unscented {
       });
       const S digits = detail::digits_of_points(belief.mean, belief.covariance, center, in.covariance);
       detail::correct_by_moments<X, m, S>(belief, moments.cross, in, gate, digits,
-                                          by_array(belief, sensor, r, in, c2, digits));
+                                          by_array(belief, plain, r, in, c2, digits));
       return in;
     }
   }
@@ -218,9 +223,10 @@ private:
   }
 
   /// Predict for sizes known at compile time.
-  template <Manifold X, class F, class Q>
+  template <Manifold X, class Process, class F, class Q>
     requires(dof<X> != dynamic)
-  [[gnu::always_inline]] Status advance(Gaussian<X>& belief, const F& f, const Q& q, double c2) const {
+  [[gnu::always_inline]] Status advance(Gaussian<X>& belief, const Process& process, const F& f, const Q& q,
+                                        double c2) const {
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
     detail::Column<n, S> root[n], noise[n];
@@ -241,6 +247,7 @@ private:
     Tangent<X> step;
     moments.mean.store(step.data());
     const X mean = retract(center, step);
+    if (process.misfit()) return Status::size_mismatch;
     if (!detail::finite_variances(p) || !detail::finite_state(mean)) [[unlikely]]
       return detail::diagnose_prediction(p, mean);
     if (!detail::looks_like_noise<n>(q)) [[unlikely]]
@@ -254,15 +261,17 @@ private:
   }
 
   /// The same for sizes known at run time.
-  template <Manifold X, class F>
+  template <Manifold X, class Process, class F>
     requires(dof<X> == dynamic)
-  Status advance(Gaussian<X>& belief, const F& f, const CovarianceOf<X>& q, double c2) const {
+  Status advance(Gaussian<X>& belief, const Process& process, const F& f, const CovarianceOf<X>& q,
+                 double c2) const {
     using S = ScalarOf<X>;
     CovarianceOf<X> root = belief.covariance;
     if (!detail::checked_root<dof<X>, S>(belief.covariance, root)) return refusal<X>(belief);
     if (const Status status = detail::judge_noise<dof<X>, S>(q); status != Status::accepted) return status;
     const auto next = detail::unscented_transform(
         belief.mean, root, [&](const X& x) -> X { return f(x); }, c2, beta_minus_alpha2());
+    if (process.misfit()) return Status::size_mismatch;
     CovarianceOf<X> covariance = next.covariance * static_cast<S>(fading);
     covariance += symmetrised(q);
     for (int i = 0; i < static_cast<int>(covariance.rows()); ++i)
@@ -274,13 +283,15 @@ private:
     return Status::accepted;
   }
 
-  template <class H>
+  template <class H, class V>
   [[gnu::cold]] Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> refused(
-      const Gaussian<typename H::State>& belief, const H& sensor, const typename H::Measurement& z,
+      const Gaussian<typename H::State>& belief, const detail::PlainSensor<H, V>& sensor,
       Status status) const {
-    using Z = typename H::Measurement;
-    auto in = detail::fresh_innovation<dof<Z>, ScalarOf<typename H::State>>(
-        local(Z(sensor.predict(belief.mean)), z), detail::dense_of(sensor.noise(belief.mean)));
+    using S = ScalarOf<typename H::State>;
+    const auto residual = sensor.residual(belief.mean);
+    const CovarianceOf<typename H::Measurement> r = detail::dense_of(sensor.noise(belief.mean));
+    if (sensor.misfit()) return detail::misfitting(sensor);
+    auto in = detail::fresh_innovation<dof<typename H::Measurement>, S>(residual, r);
     in.status = status;
     return in;
   }

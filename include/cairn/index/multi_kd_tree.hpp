@@ -13,12 +13,14 @@
 /// points are marked, and dropped at the next merge, or when half of all are dead. The binary counter is to
 /// be had as well, and merging that takes no step long (multi_tree_shape.hpp).
 ///
-///   MultiKdTree<float, 3> map;
-///   const PointId first = map.insert(points);           // numbered first, first + 1, ...
-///   map.erase(first);                                   // found by nothing from here on
-///   BestBinFirst<MultiKdTree<float, 3>> search;         // under a budget; keep one for many searches
-///   search.search(map, query, collector, {.leaves = 24});
-///   for (PointId id : inside(map, low, high)) ...       // and NearestFirst order(map, query)
+/// ```cpp
+/// cairn::MultiKdTree<float, 3> map;
+/// const cairn::PointId first = map.insert(points);           // numbered first, first + 1, ...
+/// map.erase(first);                                          // found by nothing from here on
+/// cairn::BestBinFirst<cairn::MultiKdTree<float, 3>> search;  // under a budget; keep one for many searches
+/// search.search(map, query, collector, {.leaves = 24});
+/// for (const cairn::PointId id : cairn::inside(map, low, high)) use(id);  // and NearestFirst order(map, query)
+/// ```
 ///
 /// Const methods may run at the same time, on any threads, also while a merge is under way in the background;
 /// not during a call of insert, erase, rebuild or finish_merges. To go on answering during those, answer from

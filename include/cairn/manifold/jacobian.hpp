@@ -24,13 +24,14 @@ namespace cairn::inline CAIRN_ABI {
 
 /// The derivative of f at x by central differences: 2 dof + 1 calls of f. The step is eps^(1/3) times
 /// max(1, |x_j|) for vectors and eps^(1/3) for other states; the error is about eps^(2/3) of f'''.
+/// Empty where f returns vectors of different run-time sizes.
 template <Manifold X, class F>
 [[nodiscard]] auto numeric_jacobian(const F& f, const X& x) {
   using S = ScalarOf<X>;
-  using Y = std::decay_t<decltype(f(x))>;
+  using Y = decltype(detail::evaluated(f(x)));
   using std::abs;
   using std::cbrt;
-  const Y center = f(x);
+  const Y center = detail::evaluated(f(x));
   const int n = dof_of(x);
   Matrix<dof<Y>, dof<X>, S> jacobian(dof_of(center), n);
   Tangent<X> d = manifold_traits<X>::local(x, x);
@@ -40,9 +41,12 @@ template <Manifold X, class F>
       if (abs(x(j)) > S(1)) h *= abs(x(j));
     d.setZero();
     d(j) = h;
-    const Y up = f(retract(x, d));
+    const Y up = detail::evaluated(f(retract(x, d)));
     d(j) = -h;
-    const Y down = f(retract(x, d));
+    const Y down = detail::evaluated(f(retract(x, d)));
+    if constexpr (dof<Y> == dynamic)
+      if (dof_of(up) != dof_of(center) || dof_of(down) != dof_of(center))
+        return Matrix<dof<Y>, dof<X>, S>(0, n);
     jacobian.col(j) = (local(center, up) - local(center, down)) / (S(2) * h);
   }
   return jacobian;
@@ -86,9 +90,9 @@ template <Manifold X, class F>
   const auto lifted = detail::Recast<X, D>::of(x);
   Vector<n, D> d;
   for (int j = 0; j < n; ++j) d(j) = D::variable(S(0), j);
-  const auto y = f(retract(lifted, d));
+  const auto y = detail::evaluated(f(retract(lifted, d)));
   using Y = std::decay_t<decltype(y)>;
-  const auto center = f(lifted);
+  const auto center = detail::evaluated(f(lifted));
   const auto step = local<Y>(center, y);
   Matrix<dof<Y>, n, S> jacobian(step.size(), n);
   for (int i = 0; i < static_cast<int>(step.size()); ++i)

@@ -6,6 +6,8 @@
 ///
 ///   LinearModel   x' = F x + b + B u + noise(Q)      one step, whatever dt is
 ///   LinearSensor  z  = H x + d + noise(R)
+/// Matrices of run-time sizes that fit neither one another nor the state give an empty state or measurement,
+/// which filters refuse (Status::size_mismatch).
 #pragma once
 
 #include <cairn/core/linalg.hpp>
@@ -26,7 +28,7 @@ struct LinearModel {
   Matrix<N, N, S> covariance;
   Vector<N, S> offset = Vector<N, S>::Zero(N == dynamic ? 0 : N);  ///< may stay empty for run-time sizes
 
-  [[nodiscard]] State propagate(const State& x, const Control&, double) const {
+  [[nodiscard]] auto propagate(const State& x, const Control&, double) const {
     return detail::affine(transition, x, offset);
   }
   [[nodiscard]] const Matrix<N, N, S>& jacobian(const State&, const Control&, double) const {
@@ -48,8 +50,15 @@ struct ControlledLinearModel {
   Matrix<N, U, S> input;
   Matrix<N, N, S> covariance;
 
-  [[nodiscard]] State propagate(const State& x, const Control& u, double) const {
-    return transition * x + input * u;
+  [[nodiscard]] auto propagate(const State& x, const Control& u, double) const {
+    if constexpr (N != dynamic && U != dynamic) {
+      return State(transition * x + input * u);
+    } else {
+      detail::VectorOrNone<N, S> next;
+      const bool fits = transition.cols() == x.size() && input.cols() == u.size();
+      if (fits && transition.rows() == input.rows()) next = transition * x + input * u;
+      return next;
+    }
   }
   [[nodiscard]] const Matrix<N, N, S>& jacobian(const State&, const Control&, double) const {
     return transition;
@@ -70,7 +79,7 @@ struct LinearSensor {
   Matrix<M, M, S> covariance;
   Vector<M, S> offset = Vector<M, S>::Zero(M == dynamic ? 0 : M);  ///< may stay empty for run-time sizes
 
-  [[nodiscard]] Measurement predict(const State& x) const { return detail::affine(design, x, offset); }
+  [[nodiscard]] auto predict(const State& x) const { return detail::affine(design, x, offset); }
   [[nodiscard]] const Matrix<M, N, S>& jacobian(const State&) const { return design; }
   [[nodiscard]] const Matrix<M, M, S>& noise(const State&) const { return covariance; }
 };

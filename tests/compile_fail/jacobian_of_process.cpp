@@ -1,0 +1,14 @@
+// words: cairn: jacobian(x, u, dt) of a process; Expected<3, 3, double>; Found<3, 2, double>
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <cairn/filter/extended.hpp>
+
+#include "models.hpp"
+
+struct Broken : Process {
+  cairn::Matrix<3, 2> jacobian(const State&, const Control&, double) const { return {}; }
+};
+
+auto step(Belief& belief, const Broken& process, const cairn::Vector<2>& u) {
+  return cairn::Extended{}.predict(belief, process, u, 1.0);
+}

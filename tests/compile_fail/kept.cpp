@@ -1,0 +1,13 @@
+// compiles: the models beside this, whose promises are kept
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <cairn/filter/kalman.hpp>
+
+#include "models.hpp"
+
+auto predict(Belief& belief, const Process& process, const cairn::Vector<2>& u) {
+  return cairn::Kalman{}.predict(belief, process, u, 1.0);
+}
+auto update(Belief& belief, const Sensor& sensor, const cairn::Vector<2>& z) {
+  return cairn::Kalman{}.update(belief, sensor, z);
+}

@@ -1,0 +1,14 @@
+// words: cairn: noise(x, u, dt) of a process; Expected<3, 3, double>; Found<2, 2, double>
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <cairn/filter/kalman.hpp>
+
+#include "models.hpp"
+
+struct Broken : Process {
+  cairn::Matrix<2> noise(const State&, const Control&, double) const { return {}; }
+};
+
+auto step(Belief& belief, const Broken& process, const cairn::Vector<2>& u) {
+  return cairn::Kalman{}.predict(belief, process, u, 1.0);
+}
