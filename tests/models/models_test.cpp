@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 
+#include <Eigen/LU>
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
@@ -132,7 +133,9 @@ TEST_SUITE("models") {
     auto belief = prior;
     REQUIRE(cairn::Extended{.iterations = 30}.update(belief, sensor, z).accepted());
     const auto cost = [&](const SE2& x) {
-      return cairn::detail::posterior_cost(prior, cairn::local(prior.mean, x), sensor, z);
+      const Vector<3> e = cairn::local(prior.mean, x);
+      const auto r = cairn::local(sensor.predict(x), z);
+      return e.dot(prior.covariance.inverse() * e) + r.dot(cairn::Matrix<2>(sensor.noise(x)).inverse() * r);
     };
     const double best = cost(belief.mean);
     for (int axis = 0; axis < 3; ++axis)
