@@ -132,7 +132,8 @@ TEST_SUITE("ill conditioned") {
       const Table<float> table(d);
       table.print("float d", d);
       CHECK(table.of[6].error < 1e-4);
-      CHECK(table.of[4].error < 1e-1);
+      CHECK((!table.of[4].accepted || table.of[4].error < 1e-3));  // refused where rounding would decide
+      if (d >= 3e-4) CHECK(table.of[4].accepted);
       CHECK(table.of[6].accepted);
     }
   }

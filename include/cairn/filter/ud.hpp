@@ -163,7 +163,8 @@ private:
   [[gnu::always_inline]] static bool take(Innovation<M, S>& in, const H& h, const Vector<M, S>& residual,
                                           const Matrix<M, M, S>& r, Columns<N, S>& u, detail::Column<N, S>& d,
                                           detail::Column<N, S>& step) {
-    bool regular = true;
+    bool regular = true, lost = false;
+    S variances[M];
     detail::each<M>([&](int i) {
       S products[N];
       detail::each<N>([&](int j) { products[j] = row_dot(h, i, u[j]); });
@@ -172,11 +173,18 @@ private:
       const S variance = r(i, i) > S(0) ? detail::bierman<N, S>(u, d, f, r(i, i), gain)
                                         : detail::bierman_without_noise<N, S>(u, d, f, r(i, i), gain);
       regular = regular && r(i, i) >= S(0) && variance > S(0);
+      variances[i] = variance;
+      lost = lost || variance < detail::digits_left<S> * in.covariance(i, i);
       const S error = residual(i) - row_dot(h, i, step);
       const S scaled = error / variance;
       step.add(gain, scaled);
       in.nis += error * scaled;
     });
+    if (lost && regular) [[unlikely]] {  // by the rounding of S as it is written
+      using std::log;
+      in.log_determinant = S(0);
+      for (const S& variance : variances) in.log_determinant += log(variance);
+    }
     return regular;
   }
 
