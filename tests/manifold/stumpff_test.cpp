@@ -5,7 +5,7 @@
 
 #include <doctest/doctest.h>
 
-#include <cairn/manifold/stumpff.hpp>
+#include <cairn/manifold/detail/stumpff.hpp>
 
 TEST_SUITE("stumpff") {
   TEST_CASE("stumpff: equals the closed forms in long double on both sides of the switch") {

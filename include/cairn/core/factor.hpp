@@ -17,9 +17,7 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
-
-namespace detail {
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
 /// Part of a variance that rounding may have made or hidden: a conditional variance below this share of the
 /// variance itself counts as none.
@@ -34,8 +32,8 @@ inline constexpr S digits_left = S(4096) * std::numeric_limits<S>::epsilon();
 template <class S>
 inline constexpr S root_digits_left = S(1024) * std::numeric_limits<S>::epsilon();
 
-/// root root^T = a for a covariance of any rank: one column for each direction with variance, zeros after them.
-/// Not triangular, but row order(k), the k-th pivot, has nothing after column k.
+/// root root^T = a for a covariance of any rank: one column for each direction with variance, zeros after
+/// them. Not triangular, but row order(k), the k-th pivot, has nothing after column k.
 template <int N, class S>
 struct PivotedRoot {
   Matrix<N, N, S> root;
@@ -88,8 +86,7 @@ template <int N, class S>
   result.rank = k;
   for (int j = 0; j < n; ++j)
     for (int i = j; i < n; ++i)
-      if (waits(i) > S(0) && waits(j) > S(0) &&
-          !(left(i, j) >= S(-2) * slack && left(i, j) <= S(2) * slack))
+      if (waits(i) > S(0) && waits(j) > S(0) && !(left(i, j) >= S(-2) * slack && left(i, j) <= S(2) * slack))
         return false;
   for (int j = 0; j < k; ++j)
     for (int i = 0; i < n; ++i) root(i, j) *= sigma(i);
@@ -186,5 +183,4 @@ template <int N, class S>
   return true;
 }
 
-}  // namespace detail
-}  // namespace cairn::inline CAIRN_ABI
+}}}  // namespace cairn::CAIRN_ABI::detail

@@ -34,13 +34,13 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
-#include <cairn/field/correlation_refinement.hpp>
-#include <cairn/field/correlation_surface.hpp>
-#include <cairn/field/fft.hpp>
+#include <cairn/field/detail/correlation_refinement.hpp>
+#include <cairn/field/detail/correlation_surface.hpp>
+#include <cairn/field/detail/fft.hpp>
 #include <cairn/field/patch.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// What a search concludes.
 enum class FixVerdict {
@@ -244,4 +244,4 @@ template <FieldInterpolant Map>
   return fix;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

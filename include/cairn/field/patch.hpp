@@ -21,7 +21,7 @@
 #include <cairn/field/field_map.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// The layout of a frame's samples.
 struct PatchShape {
@@ -89,4 +89,4 @@ void sample_patch(const Map& map, const PatchShape& shape, const PatchPlacement&
     }
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

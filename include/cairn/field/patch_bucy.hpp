@@ -31,13 +31,13 @@
 #include <cairn/field/patch_gram.hpp>
 #include <cairn/field/patch_model.hpp>
 #include <cairn/field/patch_noise.hpp>
+#include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kalman_bucy.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/plain_model.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -241,4 +241,4 @@ PatchVerdict PatchBucy::integrate(Gaussian<typename Placement::State>& belief, c
                                                      : PatchVerdict::not_positive_definite;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

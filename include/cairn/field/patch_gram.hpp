@@ -20,7 +20,7 @@
 #include <cairn/field/patch_noise.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// What became of a frame. Only `accepted` changes the belief.
 enum class [[nodiscard]] PatchVerdict {
@@ -141,4 +141,4 @@ private:
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

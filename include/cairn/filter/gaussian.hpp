@@ -14,13 +14,13 @@
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/random.hpp>
-#include <cairn/filter/elimination.hpp>
-#include <cairn/filter/kernels.hpp>
+#include <cairn/filter/detail/covariance.hpp>
+#include <cairn/filter/detail/products.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/manifold/manifold.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -81,8 +81,8 @@ template <Manifold X>
     return all_finite(manifold_traits<X>::local(x, x));
 }
 
-/// Cholesky's factor where every pivot is well above the rounding of its row, else false: `lower` is of no use
-/// then.
+/// Cholesky's factor where every pivot is well above the rounding of its row, else false: `lower` is of no
+/// use then.
 template <int N, class S>
 [[nodiscard]] bool regular_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& lower) {
   using std::sqrt;
@@ -204,8 +204,8 @@ Gaussian<X> Gaussian<X>::checked(const X& mean, const Covariance& covariance) {
   return {mean, symmetric};
 }
 
-/// Normalised estimation error squared of the belief at `truth`: d^T P^-1 d with d = local(mean, truth). For a
-/// consistent filter it is chi-square of as many degrees of freedom as P has rank: dof where P is regular.
+/// Normalised estimation error squared of the belief at `truth`: d^T P^-1 d with d = local(mean, truth). For
+/// a consistent filter it is chi-square of as many degrees of freedom as P has rank: dof where P is regular.
 /// Where P is singular its pseudo-inverse stands for P^-1, and the result is infinity for an error in a
 /// direction without variance, one that exceeds the deviation that the rounding of P may hide.
 template <Manifold X>
@@ -230,4 +230,4 @@ template <Manifold X>
   return retract(belief.mean, step);
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

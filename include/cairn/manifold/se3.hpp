@@ -16,12 +16,12 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/manifold/detail/stumpff.hpp>
 #include <cairn/manifold/manifold.hpp>
 #include <cairn/manifold/so3.hpp>
-#include <cairn/manifold/stumpff.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// A rigid motion, or pose.
 template <class S = double>
@@ -153,4 +153,4 @@ struct manifold_traits<BasicSE3<S>> {
   static Tangent local(const BasicSE3<S>& x, const BasicSE3<S>& y) { return (x.inverse() * y).log(); }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

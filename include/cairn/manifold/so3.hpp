@@ -17,11 +17,11 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/manifold/detail/stumpff.hpp>
 #include <cairn/manifold/manifold.hpp>
-#include <cairn/manifold/stumpff.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -235,4 +235,4 @@ struct manifold_traits<BasicSO3<S>> {
   static Tangent local(const BasicSO3<S>& x, const BasicSO3<S>& y) { return (x.inverse() * y).log(); }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -25,15 +25,15 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/parallel.hpp>
 #include <cairn/version.hpp>
+#include <cairn/vision/detail/surf_descriptor.hpp>
+#include <cairn/vision/detail/surf_orientation.hpp>
 #include <cairn/vision/fast_hessian.hpp>
 #include <cairn/vision/features.hpp>
 #include <cairn/vision/image.hpp>
 #include <cairn/vision/integral_image.hpp>
 #include <cairn/vision/keypoint_selection.hpp>
-#include <cairn/vision/surf_descriptor.hpp>
-#include <cairn/vision/surf_orientation.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Thresholds of other programs in the unit used here, (grey levels)^2 with the filters divided by their
 /// area. OpenSURF scales the image to 0..1; OpenCV divides each box by its own area and weighs Dxy more, so
@@ -176,4 +176,4 @@ private:
 
 static_assert(FeatureExtractor<Surf> && Detector<Surf> && Descriptor<Surf>);
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI
