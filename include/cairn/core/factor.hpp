@@ -172,6 +172,27 @@ void put_transposed(Array& array, int row, int column, const A& a) {
     for (int i = 0; i < static_cast<int>(a.rows()); ++i) array(row + j, column + i) = a(i, j);
 }
 
+/// Cholesky's factor where every pivot is well above the rounding of its row, else false: `lower` is of no
+/// use then.
+template <int N, class S>
+[[nodiscard]] bool regular_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& lower) {
+  using std::sqrt;
+  const int n = static_cast<int>(a.rows());
+  lower = Matrix<N, N, S>::Zero(n, n);
+  for (int j = 0; j < n; ++j) {
+    for (int i = j; i < n; ++i) {
+      S sum = a(i, j);
+      for (int k = 0; k < j; ++k) sum -= lower(i, k) * lower(j, k);
+      lower(i, j) = sum;
+    }
+    const S pivot = lower(j, j);
+    if (!(pivot > rounding_share<S> * a(j, j)) || !(pivot <= std::numeric_limits<S>::max())) return false;
+    const S deviation = sqrt(pivot);
+    for (int i = j; i < n; ++i) lower(i, j) /= deviation;
+  }
+  return true;
+}
+
 /// Lower triangular root of any positive semi-definite `a`; false where it is none.
 template <int N, class S>
 [[nodiscard, gnu::cold, gnu::noinline]] bool singular_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& root) {
@@ -181,6 +202,12 @@ template <int N, class S>
   triangularise(array);
   root = lower_part<Matrix<N, N, S>>(array, 0, static_cast<int>(a.rows()));
   return true;
+}
+
+/// The same, the quick way first.
+template <int N, class S>
+[[nodiscard]] bool dense_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& root) {
+  return regular_root<N, S>(a, root) || singular_root<N, S>(a, root);
 }
 
 }}}  // namespace cairn::CAIRN_ABI::detail

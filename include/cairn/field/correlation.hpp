@@ -218,7 +218,7 @@ template <FieldInterpolant Map>
                 "correlation_search needs a positive radius and a bank of at least one heading and scale");
   Fix fix;
   fix.placement = guess;
-  const Plane patch = detail::centred_patch(shape, z);
+  const detail::Plane patch = detail::centred_patch(shape, z);
   if (patch.values.empty()) {
     fix.verdict = FixVerdict::flat_patch;
     return fix;

@@ -31,7 +31,6 @@
 #include <cairn/field/patch_gram.hpp>
 #include <cairn/field/patch_model.hpp>
 #include <cairn/field/patch_noise.hpp>
-#include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kalman_bucy.hpp>
 #include <cairn/filter/model.hpp>

@@ -22,17 +22,6 @@
 
 namespace cairn { inline namespace CAIRN_ABI {
 
-/// What became of a frame. Only `accepted` changes the belief.
-enum class [[nodiscard]] PatchVerdict {
-  accepted,
-  flat,                   ///< the map has no slope under the frame, or no contrast to tell gain from bias
-  outside,                ///< too few samples lie inside the map
-  gated,                  ///< the residuals that are left are larger than the noise allows
-  not_finite,             ///< NaN or infinity in the frame or the belief
-  not_positive_definite,  ///< the belief's covariance
-  size_mismatch,  ///< the frame has not one number a sample, or the motion's run-time sizes do not fit
-};
-
 /// Memory that updates reuse. One per thread.
 struct PatchScratch {
   PatchSamples samples;

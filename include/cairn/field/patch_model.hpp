@@ -26,7 +26,6 @@
 
 #include <cairn/core/linalg.hpp>
 #include <cairn/field/patch.hpp>
-#include <cairn/filter/detail/explain_sizes.hpp>
 #include <cairn/filter/matrix_of.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/version.hpp>

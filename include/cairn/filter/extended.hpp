@@ -22,6 +22,7 @@
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/detail/array_update.hpp>
+#include <cairn/filter/detail/covariance.hpp>
 #include <cairn/filter/detail/update.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>

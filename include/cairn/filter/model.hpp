@@ -49,6 +49,7 @@
 #include <concepts>
 
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/detail/explain_sizes.hpp>
 #include <cairn/filter/matrix_of.hpp>
 #include <cairn/manifold/manifold.hpp>
 #include <cairn/version.hpp>

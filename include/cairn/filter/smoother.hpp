@@ -33,6 +33,7 @@
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/detail/array_update.hpp>
+#include <cairn/filter/detail/covariance.hpp>
 #include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/detail/products.hpp>
 #include <cairn/filter/extended.hpp>

@@ -23,6 +23,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/detail/covariance.hpp>
 #include <cairn/filter/detail/products.hpp>
 #include <cairn/filter/detail/sigma_moments.hpp>
 #include <cairn/filter/gaussian.hpp>

@@ -27,6 +27,8 @@
 #include <cairn/geometry/detail/stereo_pose_problem.hpp>
 #include <cairn/geometry/detail/stereo_residual.hpp>
 #include <cairn/geometry/ransac.hpp>
+#include <cairn/geometry/stereo_match.hpp>
+#include <cairn/geometry/stereo_pose_options.hpp>
 #include <cairn/geometry/stereo_rig.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>

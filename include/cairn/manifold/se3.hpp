@@ -123,7 +123,7 @@ private:
   // Q(rho, w) of (3).
   [[nodiscard]] static Matrix<3, 3, S> coupling(const Tangent& d) {
     const Vector<3, S> omega = rotation_of(d);
-    const Stumpff<S> f = stumpff<S>(omega.squaredNorm());
+    const detail::Stumpff<S> f = detail::stumpff<S>(omega.squaredNorm());
     const S last = S(0.5) * (f.c[4] - S(3) * f.c[5]);
     const Matrix<3, 3, S> P = skew(translation_of(d)), W = skew(omega);
     const Matrix<3, 3, S> WP = product(W, P), PW = product(P, W), WPW = product(WP, W);

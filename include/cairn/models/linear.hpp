@@ -11,7 +11,7 @@
 #pragma once
 
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/detail/products.hpp>
+#include <cairn/filter/affine.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/version.hpp>
 

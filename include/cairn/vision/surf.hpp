@@ -45,6 +45,9 @@ namespace cairn { inline namespace CAIRN_ABI {
   return threshold / 29.16F;
 }
 
+/// Sub-regions of the descriptor: those of Bay et al., or those of M-SURF, which overlap.
+enum class SurfLayout { plain, overlapping };
+
 struct SurfOptions {
   bool upright = false;  ///< leave out the direction: faster and more distinct where the camera does not roll
   bool extended = false;  ///< 128 numbers instead of 64
@@ -154,8 +157,8 @@ private:
     parallel_for(features.size(), threads_, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         Keypoint& keypoint = features.keypoints[i];
-        detail::describe_keypoint(sums_, keypoint, find_angle, options_.layout, options_.extended,
-                                  features.descriptors.data() + i * columns);
+        detail::describe_keypoint(sums_, keypoint, find_angle, options_.layout == SurfLayout::overlapping,
+                                  options_.extended, features.descriptors.data() + i * columns);
         keypoint.at_rim = detail::reaches_over_rim(sums_, keypoint);
       }
     });

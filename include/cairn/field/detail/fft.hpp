@@ -19,7 +19,7 @@
 #include <cairn/core/check.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn { inline namespace CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
 /// A rectangle of numbers, row by row.
 struct Plane {
@@ -40,8 +40,6 @@ private:
            static_cast<std::size_t>(column);
   }
 };
-
-namespace detail {
 
 /// The smallest product of 2, 3 and 5 that is at least n and 2 (Eigen has no transform of one number).
 inline int fast_length(int n) noexcept {
@@ -77,8 +75,6 @@ inline void transform(std::vector<Complex>& plane, int columns, int rows, bool b
   }
 }
 
-}  // namespace detail
-
 /// result(s, t) = sum over (c, r) of big(s + c, t + r) small(c, r), for every shift at which the small plane
 /// lies inside the big one: (big.columns - small.columns + 1) x (big.rows - small.rows + 1) sums. One
 /// transform serves both planes, as real and imaginary part. O(n log n).
@@ -86,27 +82,27 @@ inline void transform(std::vector<Complex>& plane, int columns, int rows, bool b
   CAIRN_EXPECTS(
       small.columns >= 1 && small.rows >= 1 && small.columns <= big.columns && small.rows <= big.rows,
       "sliding_products needs a small plane that fits into the big one");
-  const int columns = detail::fast_length(big.columns), rows = detail::fast_length(big.rows);
+  const int columns = fast_length(big.columns), rows = fast_length(big.rows);
   const auto width = static_cast<std::size_t>(columns), height = static_cast<std::size_t>(rows);
-  std::vector<detail::Complex> z(width * height);
+  std::vector<Complex> z(width * height);
   for (int r = 0; r < big.rows; ++r)
     for (int c = 0; c < big.columns; ++c)
       z[static_cast<std::size_t>(r) * width + static_cast<std::size_t>(c)].real(big(c, r));
   for (int r = 0; r < small.rows; ++r)
     for (int c = 0; c < small.columns; ++c)
       z[static_cast<std::size_t>(r) * width + static_cast<std::size_t>(c)].imag(small(c, r));
-  detail::transform(z, columns, rows, false);
+  transform(z, columns, rows, false);
   // With Z = B + i S of real planes: B = (Z(k) + conj Z(-k)) / 2, S = (Z(k) - conj Z(-k)) / 2i.
-  std::vector<detail::Complex> product(z.size());
+  std::vector<Complex> product(z.size());
   for (std::size_t r = 0; r < height; ++r)
     for (std::size_t c = 0; c < width; ++c) {
-      const detail::Complex ahead = z[r * width + c];
-      const detail::Complex mirror = std::conj(z[(height - r) % height * width + (width - c) % width]);
-      const detail::Complex difference = ahead - mirror;
+      const Complex ahead = z[r * width + c];
+      const Complex mirror = std::conj(z[(height - r) % height * width + (width - c) % width]);
+      const Complex difference = ahead - mirror;
       product[r * width + c] =
-          0.25 * (ahead + mirror) * std::conj(detail::Complex(difference.imag(), -difference.real()));
+          0.25 * (ahead + mirror) * std::conj(Complex(difference.imag(), -difference.real()));
     }
-  detail::transform(product, columns, rows, true);
+  transform(product, columns, rows, true);
   Plane result(big.columns - small.columns + 1, big.rows - small.rows + 1);
   for (int r = 0; r < result.rows; ++r)
     for (int c = 0; c < result.columns; ++c)
@@ -114,4 +110,4 @@ inline void transform(std::vector<Complex>& plane, int columns, int rows, bool b
   return result;
 }
 
-}}  // namespace cairn::CAIRN_ABI
+}}}  // namespace cairn::CAIRN_ABI::detail

@@ -101,4 +101,36 @@ template <int N, class S>
   return good;
 }
 
+/// Lower triangular L with L L^T = a for a symmetric positive semi-definite a; false, and zeros, where it is
+/// none.
+template <int N, class S>
+[[nodiscard]] bool checked_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& root) {
+  bool good = false;
+  if constexpr (N != dynamic)
+    good = covariance_root<N, S>(a, root);
+  else
+    good = dense_root<N, S>(a, root);
+  if (!good) root.setZero();
+  return good;
+}
+
+template <int N, class S>
+[[nodiscard]] inline bool is_valid_covariance(const Matrix<N, N, S>& a) {
+  if constexpr (N != dynamic) {
+    return is_covariance<N, S>(a);
+  } else {
+    Matrix<N, N, S> lower;
+    PivotedRoot<N, S> root;
+    return regular_root<N, S>(a, lower) || pivoted_root<N, S>(a, root);
+  }
+}
+
+/// The root of what is known to be a covariance.
+template <int N, class S>
+[[nodiscard]] Matrix<N, N, S> semi_definite_root(const Matrix<N, N, S>& a) {
+  Matrix<N, N, S> root = a;
+  static_cast<void>(checked_root<N, S>(a, root));
+  return root;
+}
+
 }}}  // namespace cairn::CAIRN_ABI::detail

@@ -238,33 +238,6 @@ template <class Q>
   return good;
 }
 
-/// A vector of N numbers, or of none where sizes known at run time did not fit.
-template <int N, class S>
-using VectorOrNone = Eigen::Matrix<S, dynamic, 1, 0, N, 1>;
-
-/// A x + b. An empty b of run-time size is zero; run-time sizes that do not fit give an empty vector.
-template <int R, int C, class S>
-[[gnu::always_inline]] [[nodiscard]] inline auto affine(const Matrix<R, C, S>& a, const Vector<C, S>& x,
-                                                        const Vector<R, S>& b) {
-  if constexpr (R == dynamic || C == dynamic) {
-    VectorOrNone<R, S> y;
-    if (a.cols() != x.size() || (b.size() != 0 && b.size() != a.rows())) return y;
-    y.noalias() = a * x;
-    if (b.size() != 0) y += b;
-    return y;
-  } else {
-    Column<R, S> sum, column;
-    sum.load(b.data());
-    each<C>([&](int j) {
-      column.load(a.data() + j * R);
-      sum.add(column, x(j));
-    });
-    Vector<R, S> y;
-    sum.store(y.data());
-    return y;
-  }
-}
-
 /// cairn::product() for matrices of states, column by column in registers.
 template <int R, int C, int K, class S>
 [[nodiscard]] Matrix<R, K, S> column_product(const Matrix<R, C, S>& a, const Matrix<C, K, S>& b) {

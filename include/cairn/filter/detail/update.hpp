@@ -31,12 +31,7 @@
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn { inline namespace CAIRN_ABI {
-
-/// How the covariance is lowered by a measurement.
-enum class Form { standard, joseph, sequential };
-
-namespace detail {
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
 /// Result of an update before anyone decides to keep it. Of fixed size, it stays in columns: a copy through a
 /// matrix would be stored and loaded in different pieces (register_column.hpp).
@@ -440,5 +435,4 @@ template <class H, class V>
   return correct<typename H::State, m>(belief, h, dense_of(noise), residual, gate, form);
 }
 
-}  // namespace detail
-}}  // namespace cairn::CAIRN_ABI
+}}}  // namespace cairn::CAIRN_ABI::detail

@@ -15,18 +15,10 @@
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/geometry/detail/stereo_residual.hpp>
+#include <cairn/geometry/robust_loss.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn { inline namespace CAIRN_ABI {
-
-/// Weight of a residual of size x = chi / scale in the refinement.
-enum class RobustLoss {
-  none,   ///< 1
-  huber,  ///< 1 below x = 1, then 1 / x
-  cauchy  ///< 1 / (1 + x^2)
-};
-
-namespace detail {
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
 /// Weight of a match in the refinement.
 [[nodiscard]] inline double robust_weight(RobustLoss loss, double scale, double chi_squared) noexcept {
@@ -132,6 +124,4 @@ private:
   return result;
 }
 
-}  // namespace detail
-
-}}  // namespace cairn::CAIRN_ABI
+}}}  // namespace cairn::CAIRN_ABI::detail

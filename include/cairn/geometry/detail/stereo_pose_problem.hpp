@@ -21,6 +21,9 @@
 #include <cairn/geometry/detail/pose_equations.hpp>
 #include <cairn/geometry/detail/stereo_residual.hpp>
 #include <cairn/geometry/ransac.hpp>
+#include <cairn/geometry/robust_loss.hpp>
+#include <cairn/geometry/stereo_match.hpp>
+#include <cairn/geometry/stereo_pose_options.hpp>
 #include <cairn/geometry/stereo_rig.hpp>
 #include <cairn/geometry/triangulation.hpp>
 #include <cairn/manifold/se3.hpp>
@@ -31,28 +34,7 @@
 #define CAIRN_POSE_AVX2
 #endif
 
-namespace cairn { inline namespace CAIRN_ABI {
-
-struct StereoPoseOptions {
-  RansacOptions ransac = {};       ///< order progressive: matches are sorted, most trusted (earliest) first
-  double gate_probability = 0.99;  ///< share of good matches that pass the chi-square gate
-  RobustLoss loss = RobustLoss::cauchy;
-  double loss_scale = 3;        ///< in standard deviations of the whole residual
-  std::size_t min_inliers = 8;  ///< fewer: no consensus
-  double min_share = 0.1;       ///< of all matches that must agree; below it agreement may be chance
-  /// False where the right row only repeats the left one, as trackers on rectified images deliver it: it is
-  /// then not counted as a measurement.
-  bool right_rows = true;
-};
-
-/// What is known of the pose beforehand, such as a motion prediction: one more hypothesis and, where
-/// `information` is not zero, one more measurement in the refinement.
-struct PosePrior {
-  SE3 T_world_camera;
-  Matrix<6> information = Matrix<6>::Zero();  ///< of a right step, translation then rotation
-};
-
-namespace detail {
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
 inline void check_start(const SE3& T_world_camera, const Matrix<6>& information) {
   if (!all_finite(T_world_camera.matrix()) || !all_finite(information))
@@ -251,7 +233,6 @@ private:
   double gate_;
 };
 
-}  // namespace detail
-}}  // namespace cairn::CAIRN_ABI
+}}}  // namespace cairn::CAIRN_ABI::detail
 
 #undef CAIRN_POSE_AVX2

@@ -28,22 +28,12 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/geometry/camera.hpp>
+#include <cairn/geometry/stereo_match.hpp>
 #include <cairn/geometry/stereo_rig.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn { inline namespace CAIRN_ABI {
-
-/// A landmark of the map seen by both cameras of a rig.
-struct StereoMatch {
-  Vector<3> landmark = Vector<3>::Zero();    ///< world frame [m]
-  Matrix<3> covariance = Matrix<3>::Zero();  ///< of the landmark [m^2]; zero where known exactly
-  Vector<2> left = Vector<2>::Zero();        ///< observed pixels
-  Vector<2> right = Vector<2>::Zero();
-  double sigma_left = 0.5, sigma_right = 0.5;  ///< pixel noise in each coordinate [pixels]
-};
-
-namespace detail {
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
 /// Four doubles: one AVX register, or two of SSE2. Passed by reference only: by value their calling
 /// convention depends on the instruction set.
@@ -262,6 +252,4 @@ inline void prepare(const StereoMatch& m, std::size_t index, const StereoRig& ri
   if (!right_rows) lanes.right.yx[lane] = lanes.right.yy[lane] = 0;
 }
 
-}  // namespace detail
-
-}}  // namespace cairn::CAIRN_ABI
+}}}  // namespace cairn::CAIRN_ABI::detail

@@ -18,7 +18,7 @@
 
 #include <cairn/version.hpp>
 
-namespace cairn { inline namespace CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
 /// c[k] = c_k(x), k = 0..5.
 template <class S>
@@ -74,4 +74,4 @@ template <class S>
   return result;
 }
 
-}}  // namespace cairn::CAIRN_ABI
+}}}  // namespace cairn::CAIRN_ABI::detail

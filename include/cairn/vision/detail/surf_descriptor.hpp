@@ -29,11 +29,7 @@
 #include <cairn/vision/features.hpp>
 #include <cairn/vision/integral_image.hpp>
 
-namespace cairn { inline namespace CAIRN_ABI {
-
-enum class SurfLayout { plain, overlapping };
-
-namespace detail {
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
 inline constexpr int responses_a_side = 24;
 using DescriptorCells = CellGrid<responses_a_side + 1>;
@@ -47,10 +43,9 @@ struct SubregionWeights {
   };
   std::array<Subregion, 4> subregions{};
 
-  explicit SubregionWeights(SurfLayout kind) {
+  explicit SubregionWeights(bool overlapping) {
     for (int s = 0; s < 4; ++s) {
       Subregion& subregion = subregions[static_cast<std::size_t>(s)];
-      const bool overlapping = kind == SurfLayout::overlapping;
       subregion.begin = 5 * s + (overlapping ? 0 : 2);
       subregion.end = subregion.begin + (overlapping ? 9 : 5);
       for (int i = subregion.begin; i < subregion.end; ++i) {
@@ -63,10 +58,10 @@ struct SubregionWeights {
     }
   }
 
-  static const SubregionWeights& of(SurfLayout kind) {
-    static const SubregionWeights plain(SurfLayout::plain);
-    static const SubregionWeights overlapping(SurfLayout::overlapping);
-    return kind == SurfLayout::plain ? plain : overlapping;
+  static const SubregionWeights& of(bool overlapping) {
+    static const SubregionWeights apart(false);
+    static const SubregionWeights together(true);
+    return overlapping ? together : apart;
   }
 };
 
@@ -143,8 +138,8 @@ inline void normalise(std::span<float> numbers) noexcept {
 
 /// Writes 64 numbers, or 128 if `extended`, of a keypoint; finds its direction first when asked for,
 /// otherwise its angle is obeyed. The image must not be empty.
-inline void describe_keypoint(const IntegralImage& sums, Keypoint& keypoint, bool find_angle, SurfLayout kind,
-                              bool extended, float* out) noexcept {
+inline void describe_keypoint(const IntegralImage& sums, Keypoint& keypoint, bool find_angle,
+                              bool overlapping, bool extended, float* out) noexcept {
   DescriptorCells cells;
   if (find_angle || keypoint.angle != 0) {
     NeighbourhoodCells upright;
@@ -156,7 +151,7 @@ inline void describe_keypoint(const IntegralImage& sums, Keypoint& keypoint, boo
   }
   ResponseGrid responses;
   haar_responses(cells, responses);
-  const SubregionWeights& weights = SubregionWeights::of(kind);
+  const SubregionWeights& weights = SubregionWeights::of(overlapping);
   if (extended)
     sum_subregions<8>(responses, weights, out);
   else
@@ -173,5 +168,4 @@ inline bool reaches_over_rim(const IntegralImage& sums, const Keypoint& keypoint
          sums.height() - 0.5 - keypoint.y < half;
 }
 
-}  // namespace detail
-}}  // namespace cairn::CAIRN_ABI
+}}}  // namespace cairn::CAIRN_ABI::detail
