@@ -48,11 +48,11 @@ namespace kalman_bucy {
 static_assert(cairn::ContinuousProcess<Drifting>);
 }  // namespace kalman_bucy
 
-namespace linearise {
+namespace differentiate {
 #include "snippets/filter/differentiate_2.inc"
 using Differentiated = decltype(cairn::automatic(Pendulum{}));
 static_assert(cairn::LinearisedProcess<Differentiated>);
-}  // namespace linearise
+}  // namespace differentiate
 
 const cairn::Gaussian<cairn::SE2> planar_prior{cairn::SE2(), 0.01 * cairn::Matrix<3>::Identity()};
 const cairn::RangeBearing beacon{.beacon = {5, 1}};

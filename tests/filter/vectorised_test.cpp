@@ -71,7 +71,7 @@ void compare(double alpha, double tolerance) {
   CHECK((one_by_one.covariance - together.covariance).norm() < tolerance);
 }
 
-TEST_SUITE("wide") {
+TEST_SUITE("vectorised") {
   TEST_CASE("points side by side give what points one by one give") {
     compare<2, double>(1.0, 1e-12);
     compare<3, double>(1.0, 1e-12);

@@ -29,7 +29,7 @@ static_assert(suits_metric<cairn::Nearest<float>, cairn::L1>);  // shows reduced
 
 }  // namespace
 
-TEST_SUITE("neighbors") {
+TEST_SUITE("collectors") {
   TEST_CASE("collectors: the two nearest are told with true distances, whatever the metric") {
     const std::array query{0.0F, 0.0F};
     cairn::NearestTwo<float> euclidean;

@@ -25,7 +25,7 @@ using Forest = cairn::KdForest<>;
 
 }  // namespace
 
-TEST_SUITE("rotated_forest") {
+TEST_SUITE("kd_forest") {
   TEST_CASE("kd_forest: without a budget the answers are those of brute force, each point once") {
     cairn::Random random(cairn_test::seed(71));
     cairn::BestBinFirst<Forest> search;

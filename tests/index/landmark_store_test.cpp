@@ -156,7 +156,7 @@ void drive(Store& store, std::uint64_t seed) {
 
 }  // namespace
 
-TEST_SUITE("landmark_map") {
+TEST_SUITE("landmark_store") {
   TEST_CASE_TEMPLATE("landmark_store: a random drive goes as the plain table says", Store,
                      cairn::SingleTreeStore<8>, cairn::MultiTreeStore<8>) {
     for (std::uint64_t round = 0; round < 4; ++round) {

@@ -13,7 +13,7 @@
 
 namespace logarithmic_forest_test {
 
-TEST_SUITE("tree_forest") {
+TEST_SUITE("logarithmic_forest") {
   TEST_CASE("logarithmic_forest: gives the memory of erased points back once they are more than the others") {
     cairn::Random random(cairn_test::seed());
     std::vector<std::array<float, 3>> points(4000);

@@ -57,7 +57,7 @@ std::size_t differing(const std::vector<TwoNearest>& found, const std::vector<Tw
 
 }  // namespace
 
-TEST_SUITE("bulk_match") {
+TEST_SUITE("packed_points") {
   TEST_CASE("packed_points: the two nearest are those of brute force, whatever the points and sizes") {
     cairn::Random random(cairn_test::seed(51));
     for (const std::string& shape : cairn_test::shapes())

@@ -32,7 +32,7 @@ cairn::Tangent<X> random_step(cairn::Random& random, double scale) {
   return d;
 }
 
-TEST_SUITE("jacobian") {
+TEST_SUITE("derivatives") {
   TEST_CASE_TEMPLATE("manifold: retract and local undo each other", X, Vector<4>, SO2, SO3, SE2, SE3,
                      Product<SE2, Vector<2>>, Product<Vector<1>, SO2>,
                      Product<SO3, Product<SE3, Vector<1>>>) {

@@ -81,7 +81,7 @@ struct Echo {
   [[nodiscard]] Matrix<1> noise(const SE2&) const { return Matrix<1>(4e-4); }
 };
 
-TEST_SUITE("augmented") {
+TEST_SUITE("augmented_unscented") {
   TEST_CASE("augmented: is the Kalman filter on linear models, in all three forms and for every alpha") {
     for (const double alpha : {1.0, 1e-1, 1e-2, 1e-3, 1e-4}) {
       CAPTURE(alpha);
