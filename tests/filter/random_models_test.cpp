@@ -39,12 +39,12 @@ using cairn::Matrix;
 using cairn::Status;
 using cairn::Vector;
 using cairn_test::Distance;
-using cairn_test::ExactBelief;
-using cairn_test::ExactProblem;
-using cairn_test::Quad;
 using cairn_test::quad_abs;
 using cairn_test::quad_root;
 using cairn_test::quad_solve;
+using cairn_test::ExactBelief;
+using cairn_test::ExactProblem;
+using cairn_test::Quad;
 using cairn_test::QuadMatrix;
 
 // A model and a belief in the numbers of the filter. Sizes may be dynamic.
@@ -195,21 +195,12 @@ void show(const char* what, const QuadMatrix& m) {
     std::printf("\n");
   }
 }
-void dump(const std::string& name, const Held& held, const ExactProblem& p, const ExactBelief& start,
-          const ExactBelief& exact, const ExactBelief& found, const Distance& d) {
+void dump(const std::string& name, const Held& held, const ExactProblem& p, const ExactBelief& start, const ExactBelief& exact, const ExactBelief& found, const Distance& d) {
   std::printf("---- %s mean %g cov %g\n", name.c_str(), d.mean, d.covariance);
-  show("x", start.mean);
-  show("P", start.covariance);
-  show("factor", held.factor);
-  show("F", p.transition);
-  show("Q", p.process_noise);
-  show("H", p.design);
-  show("R", p.sensor_noise);
-  show("z", p.z);
-  show("exact x", exact.mean);
-  show("exact P", exact.covariance);
-  show("found x", found.mean);
-  show("found P", found.covariance);
+  show("x", start.mean); show("P", start.covariance); show("factor", held.factor);
+  show("F", p.transition); show("Q", p.process_noise);
+  show("H", p.design); show("R", p.sensor_noise); show("z", p.z);
+  show("exact x", exact.mean); show("exact P", exact.covariance); show("found x", found.mean); show("found P", found.covariance);
 }
 
 // One kind of step of one filter.
@@ -232,8 +223,8 @@ bool inverses_agree(const QuadMatrix& a, const QuadMatrix& b) {
   return true;
 }
 
-// The numbers of a problem are known to a digit in the last place. It counts as solvable where eight of
-// those, taken anywhere, move the answer by less than a thirtieth of what is allowed; for a form that holds
+// The numbers of a problem are known to a digit in the last place. It counts as solvable where eight of those,
+// taken anywhere, move the answer by less than a thirtieth of what is allowed; for a form that holds
 // information, that and the inverse of R.
 template <class S, class Exact>
 void judge(Tally& tally, const Held& held, const ExactProblem& problem, const Exact& solve, bool accepted,
@@ -245,22 +236,20 @@ void judge(Tally& tally, const Held& held, const ExactProblem& problem, const Ex
   for (int k = 0; k < 4 && solvable; ++k) {
     ExactBelief begin, unused, other;
     const ExactProblem moved = problem.shaken(random, 8 * ulp);
-    solvable =
-        held.shaken(random, 8 * ulp).open(begin) && solve(moved, begin, unused, other) &&
-        (!informs || (inverses_agree(exact.covariance, other.covariance) &&
-                      inverses_agree(problem.sensor_noise, moved.sensor_noise))) &&
-        distance_in_sigmas(other, exact, size, floor).worst() < 1e-3 / 30 &&
-        std::abs(other.log_determinant - exact.log_determinant) < 1e-3 &&
-        std::abs(other.log_likelihood - exact.log_likelihood) < 1e-3 * (1 + std::abs(exact.log_likelihood));
+    solvable = held.shaken(random, 8 * ulp).open(begin) && solve(moved, begin, unused, other) &&
+               (!informs || (inverses_agree(exact.covariance, other.covariance) &&
+                             inverses_agree(problem.sensor_noise, moved.sensor_noise))) &&
+               distance_in_sigmas(other, exact, size, floor).worst() < 1e-3 / 30 &&
+               std::abs(other.log_determinant - exact.log_determinant) < 1e-3 &&
+               std::abs(other.log_likelihood - exact.log_likelihood) <
+                   1e-3 * (1 + std::abs(exact.log_likelihood));
   }
   ++tally.runs;
   tally.solvable += solvable ? 1 : 0;
   tally.refused += solvable && !accepted ? 1 : 0;
-  const double odds =
-      std::abs(found.log_likelihood - exact.log_likelihood) / (1 + std::abs(exact.log_likelihood));
+  const double odds = std::abs(found.log_likelihood - exact.log_likelihood) / (1 + std::abs(exact.log_likelihood));
   if (solvable && accepted && found.log_likelihood != 0.0 && !(odds < 1e-2)) ++tally.unlikely;
-  if (solvable && !accepted && std::getenv("DUMPR"))
-    dump("refused " + tally.name, held, problem, start, exact, found, {});
+  if (solvable && !accepted && std::getenv("DUMPR")) dump("refused " + tally.name, held, problem, start, exact, found, {});
   if (!accepted) return;
   const Distance d = distance_in_sigmas(found, exact, size, floor);
   if (solvable) {
@@ -270,10 +259,8 @@ void judge(Tally& tally, const Held& held, const ExactProblem& problem, const Ex
     if (d.worst() > 1e-3 && std::getenv("DUMP")) dump(tally.name, held, problem, start, exact, found, d);
   } else {
     tally.loose += d.worst() > 1e-3 ? 1 : 0;
-    if (d.worst() > 1e-3 && std::getenv("LOOSE"))
-      std::printf("loose %s mean %g cov %g\n", tally.name.c_str(), d.mean, d.covariance);
-    if (d.covariance > 1e-3 && std::getenv("DUMPL"))
-      dump("loose " + tally.name, held, problem, start, exact, found, d);
+    if (d.worst() > 1e-3 && std::getenv("LOOSE")) std::printf("loose %s mean %g cov %g\n", tally.name.c_str(), d.mean, d.covariance);
+    if (d.covariance > 1e-3 && std::getenv("DUMPL")) dump("loose " + tally.name, held, problem, start, exact, found, d);
   }
 }
 
@@ -323,8 +310,8 @@ void run(Tallies& tallies, const std::string& name, const Filter& filter, Belief
 
 // The covariance taken into another form.
 template <class S, class X, class Belief>
-void convert(Tallies& tallies, const std::string& name, const Gaussian<X>& prior, cairn::Random random,
-             Belief& out, bool& good) {
+void convert(Tallies& tallies, const std::string& name, const Gaussian<X>& prior,
+             cairn::Random random, Belief& out, bool& good) {
   good = true;
   if constexpr (requires { Belief::from(prior).has_value(); }) {
     const auto made = Belief::from(prior);
@@ -335,13 +322,8 @@ void convert(Tallies& tallies, const std::string& name, const Gaussian<X>& prior
   }
   ExactBelief found;
   const bool given = good && give(out, found);
-  judge<S>(
-      tallies[name + ", from"], hold(prior), ExactProblem{},
-      [](const ExactProblem&, const ExactBelief& a, ExactBelief& size, ExactBelief& b) {
-        size = b = a;
-        return true;
-      },
-      given, found, random, requires { out.vector; });
+  judge<S>(tallies[name + ", from"], hold(prior), ExactProblem{}, [](const ExactProblem&, const ExactBelief& a,
+           ExactBelief& size, ExactBelief& b) { size = b = a; return true; }, given, found, random, requires { out.vector; });
 }
 
 template <int N, int M, class S>
@@ -372,12 +354,12 @@ void all_filters(Tallies& tallies, cairn::Random& random, int n, int m) {
 }
 
 void report(const char* title, const Tallies& tallies) {
-  std::printf("%s\n  %-32s %8s %8s %8s %8s %8s %10s %10s %8s %8s\n", title, "filter", "models", "solvable",
-              "wrong", "refused", "share", "mean", "covariance", "loose", "odds");
+  std::printf("%s\n  %-32s %8s %8s %8s %8s %8s %10s %10s %8s %8s\n", title, "filter", "models", "solvable", "wrong",
+              "refused", "share", "mean", "covariance", "loose", "odds");
   for (const auto& [name, t] : tallies) {
-    std::printf("  %-32s %8d %8d %8d %8d %7.2f%% %10.1e %10.1e %8d %8d\n", name.c_str(), t.runs, t.solvable,
-                t.wrong, t.refused, 100.0 * t.refused / std::max(1, t.solvable), t.worst_mean,
-                t.worst_covariance, t.loose, t.unlikely);
+    std::printf("  %-32s %8d %8d %8d %8d %7.2f%% %10.1e %10.1e %8d %8d\n", name.c_str(), t.runs, t.solvable, t.wrong,
+                t.refused, 100.0 * t.refused / std::max(1, t.solvable), t.worst_mean, t.worst_covariance,
+                t.loose, t.unlikely);
   }
   for (const auto& [name, t] : tallies) {
     CAPTURE(name);
@@ -418,8 +400,8 @@ TEST_SUITE("random models") {
     cairn::Random random(seed, 2);
     Tallies tallies;
     for (int k = 0; k < models(300); ++k)
-      all_filters<cairn::dynamic, cairn::dynamic, double>(
-          tallies, random, 1 + static_cast<int>(random.below(6)), 1 + static_cast<int>(random.below(4)));
+      all_filters<cairn::dynamic, cairn::dynamic, double>(tallies, random, 1 + static_cast<int>(random.below(6)),
+                                                          1 + static_cast<int>(random.below(4)));
     report("double, sizes known at run time", tallies);
   }
 }
