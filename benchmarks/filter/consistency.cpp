@@ -9,7 +9,7 @@
 #include <string_view>
 #include <type_traits>
 
-#include <cairn/filter/augmented.hpp>
+#include <cairn/filter/augmented_unscented.hpp>
 #include <cairn/filter/ensemble.hpp>
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/information.hpp>

@@ -12,7 +12,7 @@
 
 #include <cairn/core/random.hpp>
 #include <cairn/filter/gaussian.hpp>
-#include <cairn/filter/structure.hpp>
+#include <cairn/filter/structured.hpp>
 #include <cairn/manifold/product.hpp>
 #include <cairn/manifold/so2.hpp>
 #include <cairn/models/motion.hpp>

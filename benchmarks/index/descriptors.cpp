@@ -14,8 +14,8 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/parallel.hpp>
 #include <cairn/index/best_bin_first.hpp>
-#include <cairn/index/bulk_match.hpp>
 #include <cairn/index/descriptor_index.hpp>
+#include <cairn/index/packed_points.hpp>
 #include <cairn/index/principal_axes.hpp>
 
 #include "areas.hpp"

@@ -6,7 +6,7 @@
 #include <string>
 
 #include <cairn/core/check.hpp>
-#include <cairn/index/landmark_map.hpp>
+#include <cairn/index/landmark_store.hpp>
 
 namespace stereo_slam {
 namespace {

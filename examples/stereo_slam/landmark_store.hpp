@@ -11,7 +11,7 @@
 #include <span>
 #include <vector>
 
-#include <cairn/index/landmark_map.hpp>
+#include <cairn/index/landmark_store.hpp>
 
 #include "landmarks.hpp"
 

@@ -4,7 +4,7 @@
 /// @file
 /// The landmarks of the map: where each is, how sure that is, how often it was seen.
 ///
-/// Their looks live in a landmark store (cairn/index/landmark_map.hpp); both go by the same id.
+/// Their looks live in a landmark store (cairn/index/landmark_store.hpp); both go by the same id.
 #pragma once
 
 #include <cstddef>

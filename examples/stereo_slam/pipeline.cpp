@@ -11,7 +11,7 @@
 
 #include <cairn/core/parallel.hpp>
 #include <cairn/filter/kalman.hpp>
-#include <cairn/filter/structure.hpp>
+#include <cairn/filter/structured.hpp>
 
 namespace stereo_slam {
 namespace {

@@ -10,18 +10,17 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/statistics.hpp>
-#include <cairn/filter/driven.hpp>
+#include <cairn/filter/differentiate.hpp>
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/kalman.hpp>
 #include <cairn/filter/kalman_bucy.hpp>
-#include <cairn/filter/linearise.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/rao_blackwell.hpp>
 #include <cairn/filter/smoother.hpp>
-#include <cairn/filter/structure.hpp>
+#include <cairn/filter/structured.hpp>
 #include <cairn/filter/timeline.hpp>
 #include <cairn/filter/unscented.hpp>
-#include <cairn/filter/wide.hpp>
+#include <cairn/filter/vectorised.hpp>
 #include <cairn/manifold/product.hpp>
 #include <cairn/manifold/se2.hpp>
 #include <cairn/models/motion.hpp>
@@ -35,7 +34,7 @@ static_assert(cairn::LinearisedProcess<Unicycle> && cairn::LinearisedMeasurement
 }  // namespace model
 
 namespace driven {
-#include "snippets/filter/driven_1.inc"
+#include "snippets/filter/model_2.inc"
 static_assert(cairn::DrivenProcess<Driven> && cairn::DrivenMeasurement<Echo>);
 }  // namespace driven
 
@@ -49,11 +48,11 @@ namespace kalman_bucy {
 static_assert(cairn::ContinuousProcess<Drifting>);
 }  // namespace kalman_bucy
 
-namespace linearise {
-#include "snippets/filter/linearise_2.inc"
+namespace differentiate {
+#include "snippets/filter/differentiate_2.inc"
 using Differentiated = decltype(cairn::automatic(Pendulum{}));
 static_assert(cairn::LinearisedProcess<Differentiated>);
-}  // namespace linearise
+}  // namespace differentiate
 
 const cairn::Gaussian<cairn::SE2> planar_prior{cairn::SE2(), 0.01 * cairn::Matrix<3>::Identity()};
 const cairn::RangeBearing beacon{.beacon = {5, 1}};
@@ -95,31 +94,31 @@ struct Walker {
   [[nodiscard]] cairn::Matrix<1> noise(const State&) const { return cairn::Matrix<1>(1.0); }
 };
 
-TEST_CASE("docs: the example of wide.hpp predicts") {
+TEST_CASE("docs: the example of vectorised.hpp predicts") {
   const Walker vehicle;
   const cairn::Unscented unscented;
   const Walker::Control u(3.0);
   const double dt = 0.5;
   cairn::Gaussian<cairn::Vector<1>> belief{cairn::Vector<1>(2.0), cairn::Matrix<1>(1.0)};
-#include "snippets/filter/wide_1.inc"
+#include "snippets/filter/vectorised_1.inc"
   CHECK(status == cairn::Status::accepted);
   CHECK(belief.mean[0] == doctest::Approx(3.5));
   CHECK(belief.covariance(0, 0) == doctest::Approx(2.0));
 }
 
-TEST_CASE("docs: the first example of linearise.hpp differentiates") {
+TEST_CASE("docs: the first example of differentiate.hpp differentiates") {
   const Walker radar;
   const cairn::Extended extended;
   const cairn::Vector<1> z(5.0);
   cairn::Gaussian<cairn::Vector<1>> belief{cairn::Vector<1>(2.0), cairn::Matrix<1>(1.0)};
-#include "snippets/filter/linearise_1.inc"
+#include "snippets/filter/differentiate_1.inc"
   CHECK(innovation.accepted());
   CHECK(innovation.covariance(0, 0) == doctest::Approx(17.0));
 }
 
-TEST_CASE("docs: the examples of structure.hpp are the matrices they look like") {
+TEST_CASE("docs: the examples of structured.hpp are the matrices they look like") {
   const double dt = 0.5;
-#include "snippets/filter/structure_1.inc"
+#include "snippets/filter/structured_1.inc"
   CHECK(cairn::Matrix<3>(F) == (cairn::Matrix<3>() << 1, 0, dt, 0, 1, 0, 0, 0, 1).finished());
   CHECK(cairn::Matrix<3>(H_landmark) == cairn::Matrix<3>::Identity());
   const cairn::Matrix<2, 6> position = H_position;

@@ -17,15 +17,15 @@
 #include <cairn/index/axis_metrics.hpp>
 #include <cairn/index/best_bin_first.hpp>
 #include <cairn/index/box_query.hpp>
-#include <cairn/index/bulk_match.hpp>
+#include <cairn/index/collectors.hpp>
 #include <cairn/index/descriptor_index.hpp>
+#include <cairn/index/kd_forest.hpp>
 #include <cairn/index/kd_tree.hpp>
-#include <cairn/index/landmark_map.hpp>
+#include <cairn/index/landmark_store.hpp>
 #include <cairn/index/multi_kd_tree.hpp>
 #include <cairn/index/nearest_first.hpp>
-#include <cairn/index/neighbors.hpp>
+#include <cairn/index/packed_points.hpp>
 #include <cairn/index/points.hpp>
-#include <cairn/index/rotated_forest.hpp>
 
 namespace docs_index_test {
 
@@ -110,12 +110,12 @@ TEST_CASE("docs: the example of nearest_first.hpp stops at the first point that 
   CHECK(asked == std::vector<cairn::PointId>{1, 0});
 }
 
-TEST_CASE("docs: the example of bulk_match.hpp finds each descriptor") {
+TEST_CASE("docs: the example of packed_points.hpp finds each descriptor") {
   const Descriptors descriptors = some_descriptors();
   const Descriptors queries(descriptors.begin(), descriptors.begin() + 5);
   std::size_t looked = 0;
   const auto look_at = [&](const auto&) { ++looked; };
-#include "snippets/index/bulk_match_1.inc"
+#include "snippets/index/packed_points_1.inc"
   CHECK(looked == 10);
 }
 
@@ -126,14 +126,14 @@ TEST_CASE("docs: the example of descriptor_index.hpp finds a descriptor") {
   CHECK(two.id() == 42);
 }
 
-TEST_CASE("docs: the example of rotated_forest.hpp finds a descriptor") {
+TEST_CASE("docs: the example of kd_forest.hpp finds a descriptor") {
   const Descriptors descriptors = some_descriptors();
   const auto& query = descriptors[42];
-#include "snippets/index/rotated_forest_1.inc"
+#include "snippets/index/kd_forest_1.inc"
   CHECK(two.id() == 42);
 }
 
-TEST_CASE("docs: the example of landmark_map.hpp sees again what it added") {
+TEST_CASE("docs: the example of landmark_store.hpp sees again what it added") {
   struct Frame {
     std::vector<float> descriptors;
     std::vector<unsigned> labels;
@@ -149,7 +149,7 @@ TEST_CASE("docs: the example of landmark_map.hpp sees again what it added") {
   const std::vector<Frame> frames{same, same, same};
   const cairn::RatioTest test{.ratio = 1.25F};
   const cairn::Budget budget;
-#include "snippets/index/landmark_map_1.inc"
+#include "snippets/index/landmark_store_1.inc"
   CHECK(store.size() == 100);
   CHECK(store.base_size() == 100);
 }

@@ -23,7 +23,7 @@ using cairn::FixVerdict;
 using cairn::PatchPlacement;
 using cairn::PatchSamples;
 using cairn::PatchShape;
-using cairn::Plane;
+using cairn::detail::Plane;
 
 namespace correlation_test {
 namespace {
@@ -56,7 +56,7 @@ TEST_SUITE("correlation") {
          {std::array{7, 5, 3, 2}, std::array{16, 16, 16, 1}, std::array{31, 17, 5, 17},
           std::array{1, 1, 1, 1}, std::array{64, 3, 2, 3}}) {
       const Plane big = noise_plane(w, h, random), small = noise_plane(sw, sh, random);
-      const Plane result = cairn::sliding_products(big, small);
+      const Plane result = cairn::detail::sliding_products(big, small);
       REQUIRE(result.columns == w - sw + 1);
       REQUIRE(result.rows == h - sh + 1);
       for (int t = 0; t < result.rows; ++t)

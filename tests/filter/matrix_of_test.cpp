@@ -4,10 +4,10 @@
 
 #include <doctest/doctest.h>
 
+#include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/kalman_bucy.hpp>
 #include <cairn/filter/matrix_of.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/rao_blackwell.hpp>
 #include <cairn/manifold/so2.hpp>
 #include <cairn/models/linear.hpp>

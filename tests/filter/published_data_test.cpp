@@ -15,9 +15,9 @@
 #include <Eigen/LU>
 #include <doctest/doctest.h>
 
+#include <cairn/filter/differentiate.hpp>
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/information.hpp>
-#include <cairn/filter/linearise.hpp>
 #include <cairn/filter/smoother.hpp>
 #include <cairn/manifold/product.hpp>
 #include <cairn/manifold/so2.hpp>

@@ -17,7 +17,7 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
-#include <cairn/filter/augmented.hpp>
+#include <cairn/filter/augmented_unscented.hpp>
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/information.hpp>
 #include <cairn/filter/kalman.hpp>

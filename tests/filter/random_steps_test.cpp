@@ -12,6 +12,7 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
+#include <cairn/filter/detail/covariance.hpp>
 #include <cairn/filter/kalman.hpp>
 #include <cairn/filter/square_root.hpp>
 #include <cairn/filter/unscented.hpp>

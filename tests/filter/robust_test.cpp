@@ -6,6 +6,7 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
+#include <cairn/filter/detail/covariance.hpp>
 #include <cairn/filter/kalman.hpp>
 #include <cairn/filter/robust.hpp>
 #include <cairn/models/linear.hpp>

@@ -8,10 +8,10 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
+#include <cairn/filter/differentiate.hpp>
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/information.hpp>
 #include <cairn/filter/kalman.hpp>
-#include <cairn/filter/linearise.hpp>
 #include <cairn/filter/square_root.hpp>
 #include <cairn/filter/unscented.hpp>
 #include <cairn/manifold/dual.hpp>

@@ -15,16 +15,16 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
-#include <cairn/filter/augmented.hpp>
+#include <cairn/filter/augmented_unscented.hpp>
 #include <cairn/filter/batch.hpp>
 #include <cairn/filter/constraint.hpp>
+#include <cairn/filter/differentiate.hpp>
 #include <cairn/filter/ensemble.hpp>
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/information.hpp>
 #include <cairn/filter/interacting.hpp>
 #include <cairn/filter/kalman.hpp>
 #include <cairn/filter/kalman_bucy.hpp>
-#include <cairn/filter/linearise.hpp>
 #include <cairn/filter/noise_fit.hpp>
 #include <cairn/filter/particle.hpp>
 #include <cairn/filter/rao_blackwell.hpp>

@@ -12,8 +12,8 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/statistics.hpp>
+#include <cairn/filter/differentiate.hpp>
 #include <cairn/filter/extended.hpp>
-#include <cairn/filter/linearise.hpp>
 #include <cairn/filter/unscented.hpp>
 #include <cairn/manifold/se3.hpp>
 

@@ -10,7 +10,7 @@
 
 #include <cairn/core/random.hpp>
 #include <cairn/geometry/camera.hpp>
-#include <cairn/manifold/jacobian.hpp>
+#include <cairn/manifold/derivatives.hpp>
 
 #include "support/random.hpp"
 

@@ -12,7 +12,7 @@
 #include <cairn/core/random.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/geometry/stereo_pose.hpp>
-#include <cairn/manifold/jacobian.hpp>
+#include <cairn/manifold/derivatives.hpp>
 
 #include "support/random.hpp"
 #include "support/rigs.hpp"

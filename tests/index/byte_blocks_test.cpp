@@ -9,7 +9,7 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
-#include <cairn/index/byte_blocks.hpp>
+#include <cairn/index/detail/byte_blocks.hpp>
 
 #include "support/random.hpp"
 

@@ -19,12 +19,12 @@
 #include <cairn/index/best_bin_first.hpp>
 #include <cairn/index/box_query.hpp>
 #include <cairn/index/brute_force.hpp>
-#include <cairn/index/bulk_match.hpp>
 #include <cairn/index/descriptor_index.hpp>
-#include <cairn/index/landmark_map.hpp>
+#include <cairn/index/kd_forest.hpp>
+#include <cairn/index/landmark_store.hpp>
 #include <cairn/index/multi_kd_tree.hpp>
 #include <cairn/index/nearest_first.hpp>
-#include <cairn/index/rotated_forest.hpp>
+#include <cairn/index/packed_points.hpp>
 
 #include "support/random.hpp"
 
@@ -170,7 +170,7 @@ Cloud<float> far_away(std::size_t count, std::size_t dim, cairn::Random& random)
 }
 
 std::size_t wrong_forest_answers(const Cloud<float>& cloud, int rounds, cairn::Random& random) {
-  using Forest = cairn::RotatedForest<>;
+  using Forest = cairn::KdForest<>;
   const Forest forest(cloud.rows(), {.trees = 3, .turned_axes = 8});
   cairn::BestBinFirst<Forest> search;
   std::size_t wrong = 0;

@@ -7,7 +7,7 @@
 
 #include <doctest/doctest.h>
 
-#include <cairn/index/kd_layout.hpp>
+#include <cairn/index/detail/kd_layout.hpp>
 #include <cairn/index/kd_tree.hpp>
 
 #include "support/folder.hpp"

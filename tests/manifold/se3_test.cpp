@@ -5,8 +5,8 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
+#include <cairn/manifold/derivatives.hpp>
 #include <cairn/manifold/dual.hpp>
-#include <cairn/manifold/jacobian.hpp>
 #include <cairn/manifold/se3.hpp>
 
 #include "support/random.hpp"

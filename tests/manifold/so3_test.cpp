@@ -7,7 +7,7 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
-#include <cairn/manifold/jacobian.hpp>
+#include <cairn/manifold/derivatives.hpp>
 #include <cairn/manifold/so3.hpp>
 
 #include "support/random.hpp"

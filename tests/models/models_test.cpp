@@ -7,8 +7,8 @@
 
 #include <cairn/core/random.hpp>
 #include <cairn/core/statistics.hpp>
+#include <cairn/filter/differentiate.hpp>
 #include <cairn/filter/extended.hpp>
-#include <cairn/filter/linearise.hpp>
 #include <cairn/filter/unscented.hpp>
 #include <cairn/models/motion.hpp>
 #include <cairn/models/sensor.hpp>

@@ -10,7 +10,7 @@
 #include <cstddef>
 
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/structure.hpp>
+#include <cairn/filter/structured.hpp>
 
 namespace cairn_test {
 

@@ -6,7 +6,7 @@
 
 #include <doctest/doctest.h>
 
-#include <cairn/vision/box_hessian.hpp>
+#include <cairn/vision/detail/box_hessian.hpp>
 
 #include "support/random.hpp"
 #include "vision/pictures.hpp"

@@ -7,7 +7,7 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
-#include <cairn/vision/cell_grid.hpp>
+#include <cairn/vision/detail/cell_grid.hpp>
 
 #include "support/random.hpp"
 #include "vision/pictures.hpp"

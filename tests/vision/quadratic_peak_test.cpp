@@ -6,7 +6,7 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
-#include <cairn/vision/quadratic_peak.hpp>
+#include <cairn/vision/detail/quadratic_peak.hpp>
 
 #include "support/random.hpp"
 

@@ -9,7 +9,7 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
-#include <cairn/vision/surf_descriptor.hpp>
+#include <cairn/vision/detail/surf_descriptor.hpp>
 
 #include "support/random.hpp"
 #include "vision/pictures.hpp"
@@ -43,13 +43,12 @@ double turned_cell(const cairn::Image& image, const cairn::Keypoint& at, double 
 }
 
 /// The definition in the header, response by response, in doubles.
-std::vector<double> slow_descriptor(const cairn::Image& image, const cairn::Keypoint& at,
-                                    cairn::SurfLayout layout, bool extended) {
+std::vector<double> slow_descriptor(const cairn::Image& image, const cairn::Keypoint& at, bool overlapping,
+                                    bool extended) {
   std::array<std::array<double, 25>, 25> cells{};
   for (std::size_t j = 0; j < 25; ++j)
     for (std::size_t i = 0; i < 25; ++i)
       cells[j][i] = turned_cell(image, at, static_cast<double>(i) - 12, static_cast<double>(j) - 12);
-  const bool overlapping = layout == cairn::SurfLayout::overlapping;
   std::vector<double> numbers;
   for (int block_y = 0; block_y < 4; ++block_y)
     for (int block_x = 0; block_x < 4; ++block_x) {
@@ -104,10 +103,10 @@ TEST_SUITE("surf_descriptor") {
       keypoint.y = static_cast<float>(random.uniform(18 * keypoint.scale, 299 - 18 * keypoint.scale));
       keypoint.angle = trial % 3 == 0 ? 0.0F : static_cast<float>(random.uniform(-3.1, 3.1));
       const bool extended = trial % 2 == 1;
-      const auto layout = trial % 5 == 0 ? cairn::SurfLayout::plain : cairn::SurfLayout::overlapping;
+      const bool overlapping = trial % 5 != 0;
       std::array<float, 128> fast;
-      cairn::detail::describe_keypoint(sums, keypoint, false, layout, extended, fast.data());
-      const std::vector<double> slow = slow_descriptor(image, keypoint, layout, extended);
+      cairn::detail::describe_keypoint(sums, keypoint, false, overlapping, extended, fast.data());
+      const std::vector<double> slow = slow_descriptor(image, keypoint, overlapping, extended);
       CAPTURE(trial);
       for (std::size_t n = 0; n < slow.size(); ++n) CHECK(std::abs(fast[n] - slow[n]) < 1e-5);
     }
@@ -121,8 +120,7 @@ TEST_SUITE("surf_descriptor") {
       keypoint.scale = 1.5F;
       std::array<float, 128> numbers;
       numbers.fill(-1);
-      cairn::detail::describe_keypoint(sums, keypoint, true, cairn::SurfLayout::overlapping, extended,
-                                       numbers.data());
+      cairn::detail::describe_keypoint(sums, keypoint, true, true, extended, numbers.data());
       const auto end = numbers.begin() + (extended ? 128 : 64);
       CHECK(std::all_of(numbers.begin(), end, [](float number) { return std::abs(number) < 1e-6F; }));
     }

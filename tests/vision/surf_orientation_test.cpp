@@ -9,7 +9,7 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
-#include <cairn/vision/surf_orientation.hpp>
+#include <cairn/vision/detail/surf_orientation.hpp>
 
 #include "support/random.hpp"
 #include "vision/pictures.hpp"

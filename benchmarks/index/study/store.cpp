@@ -5,7 +5,7 @@
 #include <vector>
 
 #include <cairn/index/best_bin_first.hpp>
-#include <cairn/index/block_lanes.hpp>
+#include <cairn/index/detail/block_lanes.hpp>
 #include <cairn/index/kd_tree.hpp>
 
 namespace cairn_study {

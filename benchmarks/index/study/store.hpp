@@ -11,8 +11,8 @@
 #include <span>
 #include <string>
 
+#include <cairn/index/collectors.hpp>
 #include <cairn/index/multi_kd_tree.hpp>
-#include <cairn/index/neighbors.hpp>
 
 namespace cairn_study {
 

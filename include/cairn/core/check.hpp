@@ -19,7 +19,7 @@
 
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// What cairn throws when data from outside cannot be used. what() names what was wrong, what was expected
 /// and where.
@@ -76,7 +76,7 @@ inline ViolationHandler set_violation_handler(ViolationHandler handler) noexcept
 #endif
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI
 
 /// A cheap precondition, checked once per call in every build.
 #define CAIRN_EXPECTS(condition, sentence)                                                    \

@@ -16,7 +16,7 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// A = L L^T of a symmetric matrix of N rows (or cairn::dynamic); G. Golub, C. Van Loan, "Matrix
 /// computations", algorithm 4.2.1.
@@ -132,4 +132,4 @@ private:
   bool good_ = true;
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

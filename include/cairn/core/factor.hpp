@@ -17,9 +17,7 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
-
-namespace detail {
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
 /// Part of a variance that rounding may have made or hidden: a conditional variance below this share of the
 /// variance itself counts as none.
@@ -34,8 +32,8 @@ inline constexpr S digits_left = S(4096) * std::numeric_limits<S>::epsilon();
 template <class S>
 inline constexpr S root_digits_left = S(1024) * std::numeric_limits<S>::epsilon();
 
-/// root root^T = a for a covariance of any rank: one column for each direction with variance, zeros after them.
-/// Not triangular, but row order(k), the k-th pivot, has nothing after column k.
+/// root root^T = a for a covariance of any rank: one column for each direction with variance, zeros after
+/// them. Not triangular, but row order(k), the k-th pivot, has nothing after column k.
 template <int N, class S>
 struct PivotedRoot {
   Matrix<N, N, S> root;
@@ -88,8 +86,7 @@ template <int N, class S>
   result.rank = k;
   for (int j = 0; j < n; ++j)
     for (int i = j; i < n; ++i)
-      if (waits(i) > S(0) && waits(j) > S(0) &&
-          !(left(i, j) >= S(-2) * slack && left(i, j) <= S(2) * slack))
+      if (waits(i) > S(0) && waits(j) > S(0) && !(left(i, j) >= S(-2) * slack && left(i, j) <= S(2) * slack))
         return false;
   for (int j = 0; j < k; ++j)
     for (int i = 0; i < n; ++i) root(i, j) *= sigma(i);
@@ -175,6 +172,27 @@ void put_transposed(Array& array, int row, int column, const A& a) {
     for (int i = 0; i < static_cast<int>(a.rows()); ++i) array(row + j, column + i) = a(i, j);
 }
 
+/// Cholesky's factor where every pivot is well above the rounding of its row, else false: `lower` is of no
+/// use then.
+template <int N, class S>
+[[nodiscard]] bool regular_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& lower) {
+  using std::sqrt;
+  const int n = static_cast<int>(a.rows());
+  lower = Matrix<N, N, S>::Zero(n, n);
+  for (int j = 0; j < n; ++j) {
+    for (int i = j; i < n; ++i) {
+      S sum = a(i, j);
+      for (int k = 0; k < j; ++k) sum -= lower(i, k) * lower(j, k);
+      lower(i, j) = sum;
+    }
+    const S pivot = lower(j, j);
+    if (!(pivot > rounding_share<S> * a(j, j)) || !(pivot <= std::numeric_limits<S>::max())) return false;
+    const S deviation = sqrt(pivot);
+    for (int i = j; i < n; ++i) lower(i, j) /= deviation;
+  }
+  return true;
+}
+
 /// Lower triangular root of any positive semi-definite `a`; false where it is none.
 template <int N, class S>
 [[nodiscard, gnu::cold, gnu::noinline]] bool singular_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& root) {
@@ -186,5 +204,10 @@ template <int N, class S>
   return true;
 }
 
-}  // namespace detail
-}  // namespace cairn::inline CAIRN_ABI
+/// The same, the quick way first.
+template <int N, class S>
+[[nodiscard]] bool dense_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& root) {
+  return regular_root<N, S>(a, root) || singular_root<N, S>(a, root);
+}
+
+}}}  // namespace cairn::CAIRN_ABI::detail

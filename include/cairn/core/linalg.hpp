@@ -13,7 +13,7 @@
 
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Size known only at run time.
 inline constexpr int dynamic = Eigen::Dynamic;
@@ -141,4 +141,4 @@ template <class Derived>
   return result;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -16,7 +16,7 @@
 
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Calls body(begin, end) on contiguous blocks that cover [0, count), on up to `threads` threads (0 counts as
 /// 1; the caller's thread takes the first block). Returns when all are done; the first block's exception that
@@ -54,4 +54,4 @@ void parallel_for(std::size_t count, unsigned threads, Body&& body) {
     if (failure) std::rethrow_exception(failure);
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

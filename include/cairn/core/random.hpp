@@ -17,7 +17,7 @@
 
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// A uniform random bit generator of 64 bits with a few draws of its own. Copy it to replay from a point.
 /// Not safe for concurrent use: give each thread its own, by a different stream.
@@ -99,4 +99,4 @@ private:
   bool has_spare_ = false;
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

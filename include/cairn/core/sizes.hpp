@@ -15,7 +15,7 @@
 #include <cairn/core/check.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI::detail {
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
 /// Whether a * b is a Size.
 template <std::unsigned_integral Size>
@@ -38,4 +38,4 @@ template <std::unsigned_integral Size>
   return count * each;
 }
 
-}  // namespace cairn::inline CAIRN_ABI::detail
+}}}  // namespace cairn::CAIRN_ABI::detail

@@ -21,7 +21,7 @@
 #include <cairn/core/check.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Regularised lower incomplete gamma P(a, x) for a > 0, x >= 0; relative error about 1e-14.
 [[nodiscard]] inline double gamma_p(double a, double x) {
@@ -159,4 +159,4 @@ private:
   return quantile(std::move(values), 0.5);
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

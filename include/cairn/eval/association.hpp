@@ -16,7 +16,7 @@
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// The same moment twice: as it was and as it was estimated. The two world frames may differ.
 struct PosePair {
@@ -79,4 +79,4 @@ struct AssociationOptions {
   return pairs;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -25,7 +25,7 @@
 #include <cairn/core/statistics.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// e^T P^-1 e, or nothing when P (only its lower triangle is read) is not positive definite.
 template <class E, class P>
@@ -86,4 +86,4 @@ private:
   RunningMoments moments_;
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

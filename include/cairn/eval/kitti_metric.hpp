@@ -28,7 +28,7 @@
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 struct KittiOptions {
   std::vector<double> lengths{100, 200, 300, 400, 500, 600, 700, 800};  ///< [m]
@@ -140,4 +140,4 @@ inline KittiRow relative(const KittiRow& a, const KittiRow& b) {
   });
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -29,7 +29,7 @@
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// What a list of errors amounts to. All zero for an empty list.
 struct ErrorStatistics {
@@ -188,4 +188,4 @@ inline std::vector<std::pair<std::size_t, std::size_t>> relative_pairs(std::span
   return RelativeError{error_statistics(translations), error_statistics(rotations)};
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

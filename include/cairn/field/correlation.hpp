@@ -34,13 +34,13 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
-#include <cairn/field/correlation_refinement.hpp>
-#include <cairn/field/correlation_surface.hpp>
-#include <cairn/field/fft.hpp>
+#include <cairn/field/detail/correlation_refinement.hpp>
+#include <cairn/field/detail/correlation_surface.hpp>
+#include <cairn/field/detail/fft.hpp>
 #include <cairn/field/patch.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// What a search concludes.
 enum class FixVerdict {
@@ -218,7 +218,7 @@ template <FieldInterpolant Map>
                 "correlation_search needs a positive radius and a bank of at least one heading and scale");
   Fix fix;
   fix.placement = guess;
-  const Plane patch = detail::centred_patch(shape, z);
+  const detail::Plane patch = detail::centred_patch(shape, z);
   if (patch.values.empty()) {
     fix.verdict = FixVerdict::flat_patch;
     return fix;
@@ -244,4 +244,4 @@ template <FieldInterpolant Map>
   return fix;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

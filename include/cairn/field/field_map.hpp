@@ -31,7 +31,7 @@
 #include <cairn/field/grid.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// A field at a point.
 struct FieldSample {
@@ -244,4 +244,4 @@ private:
   std::vector<double> coefficients_;  // with one mirrored node around
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -14,7 +14,7 @@
 #include <cairn/field/grid.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -71,4 +71,4 @@ inline void blur_grid(FieldGrid& grid, const std::vector<double>& along_x,
   return grid;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

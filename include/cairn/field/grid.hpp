@@ -20,7 +20,7 @@
 #include <cairn/core/check.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Where the nodes of a grid lie. [m], or whatever the user measures ground in.
 struct GridFrame {
@@ -93,4 +93,4 @@ private:
   std::vector<double> values_;
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

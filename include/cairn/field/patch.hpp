@@ -21,7 +21,7 @@
 #include <cairn/field/field_map.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// The layout of a frame's samples.
 struct PatchShape {
@@ -89,4 +89,15 @@ void sample_patch(const Map& map, const PatchShape& shape, const PatchPlacement&
     }
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+/// What became of a frame. Only `accepted` changes the belief.
+enum class [[nodiscard]] PatchVerdict {
+  accepted,
+  flat,                   ///< the map has no slope under the frame, or no contrast to tell gain from bias
+  outside,                ///< too few samples lie inside the map
+  gated,                  ///< the residuals that are left are larger than the noise allows
+  not_finite,             ///< NaN or infinity in the frame or the belief
+  not_positive_definite,  ///< the belief's covariance
+  size_mismatch,  ///< the frame has not one number a sample, or the motion's run-time sizes do not fit
+};
+
+}}  // namespace cairn::CAIRN_ABI

@@ -34,10 +34,9 @@
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kalman_bucy.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/plain_model.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -241,4 +240,4 @@ PatchVerdict PatchBucy::integrate(Gaussian<typename Placement::State>& belief, c
                                                      : PatchVerdict::not_positive_definite;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -29,7 +29,7 @@
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// What a frame brought.
 struct PatchUpdate {
@@ -155,4 +155,4 @@ void PatchFilter::minimise(const typename Placement::State& mean, const Matrix<N
   }
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

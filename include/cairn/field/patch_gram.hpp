@@ -20,18 +20,7 @@
 #include <cairn/field/patch_noise.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
-
-/// What became of a frame. Only `accepted` changes the belief.
-enum class [[nodiscard]] PatchVerdict {
-  accepted,
-  flat,                   ///< the map has no slope under the frame, or no contrast to tell gain from bias
-  outside,                ///< too few samples lie inside the map
-  gated,                  ///< the residuals that are left are larger than the noise allows
-  not_finite,             ///< NaN or infinity in the frame or the belief
-  not_positive_definite,  ///< the belief's covariance
-  size_mismatch,  ///< the frame has not one number a sample, or the motion's run-time sizes do not fit
-};
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Memory that updates reuse. One per thread.
 struct PatchScratch {
@@ -141,4 +130,4 @@ private:
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -26,12 +26,11 @@
 
 #include <cairn/core/linalg.hpp>
 #include <cairn/field/patch.hpp>
-#include <cairn/filter/explain_sizes.hpp>
 #include <cairn/filter/matrix_of.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -274,4 +273,4 @@ struct PatchSensor {
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -24,10 +24,10 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/field/patch.hpp>
-#include <cairn/filter/column.hpp>
+#include <cairn/simd/registers.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -182,4 +182,4 @@ private:
   Matrix<dynamic> root_gain_;  // root of G, along x across
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -26,7 +26,7 @@
 #include <cairn/field/grid.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// The law of a Gaussian random field.
 struct RandomField {
@@ -72,4 +72,4 @@ inline FieldGrid RandomField::draw(int columns, int rows, const GridFrame& frame
   return field;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -19,15 +19,15 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/correct.hpp>
+#include <cairn/filter/detail/products.hpp>
+#include <cairn/filter/detail/update.hpp>
 #include <cairn/filter/gaussian.hpp>
-#include <cairn/filter/kernels.hpp>
-#include <cairn/filter/status.hpp>
 #include <cairn/filter/matrix_of.hpp>
-#include <cairn/filter/structure.hpp>
+#include <cairn/filter/status.hpp>
+#include <cairn/filter/structured.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Any number of Gaussians over Vector<N, S>, S float or double. Also the shape of a batch of measurements:
 /// means are the values, covariances their noise.
@@ -128,7 +128,6 @@ struct BatchKalman {
   template <int N, class S>
   std::size_t update(GaussianBatch<N, S>& batch, const GaussianBatch<N, S>& seen,
                      std::span<std::uint8_t> kept = {}) const;
-
 };
 
 namespace detail {
@@ -272,4 +271,4 @@ Status BatchKalman::predict(GaussianBatch<N, S>& batch, const F& f, const Q& noi
   return Status::accepted;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -7,8 +7,8 @@
 ///   d = P D^T (D P D^T)^-1 c,   P <- P - P D^T (D P D^T)^-1 D P
 /// (D. Simon, "Kalman filtering with state constraints", IET Control Theory and Applications 4, 2010, 2.4.)
 /// Done in the units of the belief, d = L u with P = L L^T: the shortest u with D L u = c, by Householder
-/// reflections of (D L)^T with column pivots, Q R = (D L)^T, and P <- (L Q_2)(L Q_2)^T with the columns Q_2 of Q
-/// that no constraint sees. That is a sum of squares, whatever the scales.
+/// reflections of (D L)^T with column pivots, Q R = (D L)^T, and P <- (L Q_2)(L Q_2)^T with the columns Q_2
+/// of Q that no constraint sees. That is a sum of squares, whatever the scales.
 #pragma once
 
 #include <cmath>
@@ -17,13 +17,14 @@
 
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/array_update.hpp>
+#include <cairn/filter/detail/array_update.hpp>
+#include <cairn/filter/detail/covariance.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/matrix_of.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -35,10 +36,11 @@ inline constexpr int common_rows = ShapeOf<D>::rows != dynamic ? ShapeOf<D>::row
 
 }  // namespace detail
 
-/// Projects the belief onto the K constraints; for vectors D x = b is c = b - D mean. A constraint that repeats
-/// others, or what the belief is certain of, and agrees with them changes nothing. Refused, and the belief left:
-/// contradiction, where it does not agree; not_positive_definite, where constraints are so nearly the same that
-/// their difference would not have three digits, or the covariance is none. O(n^2 K + n^3).
+/// Projects the belief onto the K constraints; for vectors D x = b is c = b - D mean. A constraint that
+/// repeats others, or what the belief is certain of, and agrees with them changes nothing. Refused, and the
+/// belief left: contradiction, where it does not agree; not_positive_definite, where constraints are so
+/// nearly the same that their difference would not have three digits, or the covariance is none. O(n^2 K +
+/// n^3).
 template <Manifold X, int K>
 Status constrain(Gaussian<X>& belief, const Matrix<K, dof<X>, ScalarOf<X>>& d,
                  const Vector<K, ScalarOf<X>>& c) {
@@ -155,4 +157,4 @@ Status constrain(Gaussian<X>& belief, const D& d, const C& c) {
   return misfit ? Status::size_mismatch : constrain(belief, plain_d, plain_c);
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -26,15 +26,15 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/random.hpp>
-#include <cairn/filter/correct.hpp>
-#include <cairn/filter/driven.hpp>
+#include <cairn/filter/detail/covariance.hpp>
+#include <cairn/filter/detail/plain_model.hpp>
+#include <cairn/filter/detail/update.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 enum class EnsembleForm { perturbed, square_root };
 
@@ -219,4 +219,4 @@ private:
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -21,15 +21,16 @@
 
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/array_update.hpp>
-#include <cairn/filter/correct.hpp>
+#include <cairn/filter/detail/array_update.hpp>
+#include <cairn/filter/detail/covariance.hpp>
+#include <cairn/filter/detail/update.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/status.hpp>
-#include <cairn/manifold/jacobian.hpp>
+#include <cairn/manifold/derivatives.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Extended Kalman filter. Options only: may serve any number of beliefs and threads.
 struct Extended {
@@ -91,8 +92,7 @@ template <Manifold X>
 }  // namespace detail
 
 template <class H, class V>
-Status Extended::iterate(Gaussian<typename H::State>& belief,
-                         const detail::PlainSensor<H, V>& sensor) const {
+Status Extended::iterate(Gaussian<typename H::State>& belief, const detail::PlainSensor<H, V>& sensor) const {
   using X = typename H::State;
   using Z = typename H::Measurement;
   using S = ScalarOf<X>;
@@ -187,4 +187,4 @@ Status Extended::iterate(Gaussian<typename H::State>& belief,
   return Status::accepted;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -14,13 +14,11 @@
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/random.hpp>
-#include <cairn/filter/elimination.hpp>
-#include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/manifold/manifold.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -32,6 +30,9 @@ namespace detail {
 }
 
 }  // namespace detail
+
+/// How the covariance is lowered by a measurement.
+enum class Form { standard, joseph, sequential };
 
 /// Truth = retract(mean, d), d ~ N(0, covariance). A plain aggregate; checked() is for numbers from outside.
 template <Manifold X>
@@ -81,61 +82,8 @@ template <Manifold X>
     return all_finite(manifold_traits<X>::local(x, x));
 }
 
-/// Cholesky's factor where every pivot is well above the rounding of its row, else false: `lower` is of no use
-/// then.
-template <int N, class S>
-[[nodiscard]] bool regular_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& lower) {
-  using std::sqrt;
-  const int n = static_cast<int>(a.rows());
-  lower = Matrix<N, N, S>::Zero(n, n);
-  for (int j = 0; j < n; ++j) {
-    for (int i = j; i < n; ++i) {
-      S sum = a(i, j);
-      for (int k = 0; k < j; ++k) sum -= lower(i, k) * lower(j, k);
-      lower(i, j) = sum;
-    }
-    const S pivot = lower(j, j);
-    if (!(pivot > rounding_share<S> * a(j, j)) || !(pivot <= std::numeric_limits<S>::max())) return false;
-    const S deviation = sqrt(pivot);
-    for (int i = j; i < n; ++i) lower(i, j) /= deviation;
-  }
-  return true;
-}
-
-/// Lower triangular L with L L^T = a for a symmetric positive semi-definite a; false, and zeros, where it is
-/// none.
-template <int N, class S>
-[[nodiscard]] bool checked_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& root) {
-  bool good = false;
-  if constexpr (N != dynamic)
-    good = covariance_root<N, S>(a, root);
-  else
-    good = regular_root<N, S>(a, root) || singular_root<N, S>(a, root);
-  if (!good) root.setZero();
-  return good;
-}
-
-template <int N, class S>
-[[nodiscard]] inline bool is_valid_covariance(const Matrix<N, N, S>& a) {
-  if constexpr (N != dynamic) {
-    return is_covariance<N, S>(a);
-  } else {
-    Matrix<N, N, S> lower;
-    PivotedRoot<N, S> root;
-    return regular_root<N, S>(a, lower) || pivoted_root<N, S>(a, root);
-  }
-}
-
-/// The root of what is known to be a covariance.
-template <int N, class S>
-[[nodiscard]] Matrix<N, N, S> semi_definite_root(const Matrix<N, N, S>& a) {
-  Matrix<N, N, S> root = a;
-  static_cast<void>(checked_root<N, S>(a, root));
-  return root;
-}
-
-/// The same for singular a; infinity where d leaves the directions in which a has variance by more than the
-/// deviation that rounding of a may have hidden, or a is no covariance.
+/// d^T a^-1 d, of the pseudo-inverse, for a singular a; infinity where d leaves the directions in which a has
+/// variance by more than the deviation that rounding of a may have hidden, or a is no covariance.
 template <int N, class S>
 [[nodiscard, gnu::cold, gnu::noinline]] S mahalanobis_of_singular(const Vector<N, S>& d,
                                                                   const Matrix<N, N, S>& a) {
@@ -199,13 +147,14 @@ Gaussian<X> Gaussian<X>::checked(const X& mean, const Covariance& covariance) {
         complain("Gaussian: the covariance is not symmetric: row ", i, ", column ", j);
     }
   const Covariance symmetric = symmetrised(covariance);
-  if (!detail::is_valid_covariance<dof<X>, Scalar>(symmetric))
+  Covariance root = symmetric;
+  if (!detail::dense_root<dof<X>, Scalar>(symmetric, root))
     raise("Gaussian: the covariance is not positive semi-definite");
   return {mean, symmetric};
 }
 
-/// Normalised estimation error squared of the belief at `truth`: d^T P^-1 d with d = local(mean, truth). For a
-/// consistent filter it is chi-square of as many degrees of freedom as P has rank: dof where P is regular.
+/// Normalised estimation error squared of the belief at `truth`: d^T P^-1 d with d = local(mean, truth). For
+/// a consistent filter it is chi-square of as many degrees of freedom as P has rank: dof where P is regular.
 /// Where P is singular its pseudo-inverse stands for P^-1, and the result is infinity for an error in a
 /// direction without variance, one that exceeds the deviation that the rounding of P may hide.
 template <Manifold X>
@@ -224,10 +173,10 @@ template <Manifold X>
   Tangent<X> d = manifold_traits<X>::local(belief.mean, belief.mean);
   for (int i = 0; i < static_cast<int>(d.size()); ++i) d(i) = static_cast<ScalarOf<X>>(random.normal());
   CovarianceOf<X> root = belief.covariance;
-  const bool good = detail::checked_root<dof<X>, ScalarOf<X>>(belief.covariance, root);
+  const bool good = detail::dense_root<dof<X>, ScalarOf<X>>(belief.covariance, root);
   CAIRN_EXPECTS(good, "sample needs a covariance: finite, symmetric and positive semi-definite");
   const Tangent<X> step = root * d;
   return retract(belief.mean, step);
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -8,11 +8,11 @@
 ///   predict   Y <- (F Y^-1 F^T + Q)^-1, also where Y has no inverse: by the array
 ///             [I 0 0; -C F^-1 G  C F^-1  b] -> [* * *; 0 C' b'],   Y = C^T C,  y = C^T b,  Q = G G^T
 /// (Maybeck, "Stochastic Models, Estimation, and Control", vol. 1, 5.7; Bierman, "Factorization Methods for
-/// Discrete Sequential Estimation", 1977, VI.) Y may be singular: a state nobody has seen has zero information,
-/// and no prior is needed. Many numbers of one measurement cost one small sum each. What is less than the
-/// rounding of Y says nothing: where H^T R^-1 H swamps Y by more than its digits, the weaker directions count
-/// as unknown, and there is no mean and no covariance until they are seen. The square-root form keeps twice as
-/// many digits.
+/// Discrete Sequential Estimation", 1977, VI.) Y may be singular: a state nobody has seen has zero
+/// information, and no prior is needed. Many numbers of one measurement cost one small sum each. What is less
+/// than the rounding of Y says nothing: where H^T R^-1 H swamps Y by more than its digits, the weaker
+/// directions count as unknown, and there is no mean and no covariance until they are seen. The square-root
+/// form keeps twice as many digits.
 #pragma once
 
 #include <cmath>
@@ -24,17 +24,18 @@
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/array_update.hpp>
-#include <cairn/filter/correct.hpp>
+#include <cairn/filter/detail/array_update.hpp>
+#include <cairn/filter/detail/covariance.hpp>
+#include <cairn/filter/detail/plain_model.hpp>
+#include <cairn/filter/detail/products.hpp>
+#include <cairn/filter/detail/update.hpp>
 #include <cairn/filter/gaussian.hpp>
-#include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
-#include <cairn/filter/structure.hpp>
+#include <cairn/filter/structured.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -91,8 +92,8 @@ template <int N, class S>
   return true;
 }
 
-/// C^T with Y = C^T C, and in place of y the b with y = C^T b; false where Y is none. Not triangular where Y is
-/// singular.
+/// C^T with Y = C^T C, and in place of y the b with y = C^T b; false where Y is none. Not triangular where Y
+/// is singular.
 template <int N, class S>
 [[nodiscard]] bool information_root(const Matrix<N, N, S>& information, Matrix<N, N, S>& root,
                                     Vector<N, S>& vector) {
@@ -145,7 +146,7 @@ template <int N, class S>
   const int n = static_cast<int>(vector.size());
   const S faded = sqrt(static_cast<S>(fading));
   f *= faded;
-  Matrix<N, N, S> moved = transposed<N, N, S>(root);  // (C F^-1)^T solves F^T x = C^T
+  Matrix<N, N, S> moved = transposed<N, N, S>(root);       // (C F^-1)^T solves F^T x = C^T
   Matrix<N, N, S> back = Matrix<N, N, S>::Identity(n, n);  // F^-T
   if (!solve_square<N, N, S>(transposed<N, N, S>(f), moved) ||
       !solve_square<N, N, S>(transposed<N, N, S>(f), back))
@@ -168,8 +169,8 @@ template <int N, class S>
       if (sum > largest) largest = sum;
     }
   constexpr int width = N == dynamic ? dynamic : 2 * N + 1;
-  // Rows that say much about the noise come first: below others, what is left of them would be a difference of
-  // nearly equal numbers (A. Cox, N. Higham, "Stability of Householder QR factorization for weighted least
+  // Rows that say much about the noise come first: below others, what is left of them would be a difference
+  // of nearly equal numbers (A. Cox, N. Higham, "Stability of Householder QR factorization for weighted least
   // squares problems", 1998).
   Matrix<width, width, S> array = Matrix<width, width, S>::Zero(2 * n + 1, 2 * n + 1);
   Vector<N, S> size = Vector<N, S>::Zero(n);
@@ -363,4 +364,4 @@ private:
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -21,13 +21,13 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
+#include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// R Gaussians and how probable each is (sum 1).
 template <Manifold X, std::size_t R>
@@ -165,4 +165,4 @@ private:
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

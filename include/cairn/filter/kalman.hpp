@@ -15,13 +15,13 @@
 #include <concepts>
 #include <limits>
 
-#include <cairn/filter/correct.hpp>
+#include <cairn/filter/detail/update.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Kalman filter for linear models.
 struct Kalman {
@@ -54,4 +54,4 @@ struct Kalman {
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

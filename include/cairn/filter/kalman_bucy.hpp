@@ -9,11 +9,11 @@
 ///   x' = f(x, u) + K (z - h(x)),   P' = A P + P A^T + Q - K R K^T,   K = P H^T R^-1        (covariance)
 ///   Y' = -Y A - A^T Y - Y Q Y + H^T R^-1 H                                                 (information)
 /// (R. E. Kalman, R. S. Bucy, "New results in linear filtering and prediction theory", 1961), integrated by
-/// the classical Runge-Kutta rule in `steps` equal parts at first: each is done whole and in halves, and where
-/// the two differ by more than the tolerance the part is halved (E. Hairer, S. Norsett, G. Wanner, "Solving
-/// Ordinary Differential Equations I", II.4). An explicit rule needs a part for every few time constants of the
-/// filter. Measurements at instants go through Kalman, Extended or InformationFilter: together that is the
-/// continuous-discrete filter.
+/// the classical Runge-Kutta rule in `steps` equal parts at first: each is done whole and in halves, and
+/// where the two differ by more than the tolerance the part is halved (E. Hairer, S. Norsett, G. Wanner,
+/// "Solving Ordinary Differential Equations I", II.4). An explicit rule needs a part for every few time
+/// constants of the filter. Measurements at instants go through Kalman, Extended or InformationFilter:
+/// together that is the continuous-discrete filter.
 ///
 /// ```cpp
 /// struct Drifting {
@@ -32,15 +32,16 @@
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/correct.hpp>
+#include <cairn/filter/detail/covariance.hpp>
+#include <cairn/filter/detail/plain_model.hpp>
+#include <cairn/filter/detail/update.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/information.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// A process in continuous time.
 template <class F>
@@ -52,8 +53,8 @@ concept ContinuousProcess = Manifold<typename F::State> &&
                             };
 
 /// Kalman-Bucy filter. Options only. For states that are not vectors the rate is taken in the tangent space
-/// at the start of each part. Refused: not_converged, where most_parts do not do; a spectral density that is no
-/// covariance at the start, a sensor's that is not positive definite.
+/// at the start of each part. Refused: not_converged, where most_parts do not do; a spectral density that is
+/// no covariance at the start, a sensor's that is not positive definite.
 struct KalmanBucy {
   int steps = 1;            ///< Runge-Kutta parts of one call to begin with; >= 1
   double tolerance = 1e-6;  ///< of one part, in standard deviations; > 0
@@ -267,4 +268,4 @@ private:
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -17,11 +17,11 @@
 #include <utility>
 
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/structure.hpp>
+#include <cairn/filter/structured.hpp>
 #include <cairn/manifold/manifold.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -173,4 +173,4 @@ template <Manifold X, class Given>
 }
 
 }  // namespace detail
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

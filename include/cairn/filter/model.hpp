@@ -23,21 +23,38 @@
 /// propagate(x, u, 0) = x, jacobians agree with numeric differentiation in the tangent spaces. A model whose
 /// propagate or predict is its (constant in x) jacobian times x plus something known says so with
 /// `static constexpr bool linear = true;`. Nothing is differentiated silently: numeric(model) and
-/// automatic(model) of linearise.hpp are asked for by name.
+/// automatic(model) of differentiate.hpp are asked for by name.
 ///
 /// Matrices and vectors may be returned as anything that stands for one (matrix_of.hpp): Structured, with
 /// zeros that the filters skip, row-major, a Map, an expression. Another number of rows or columns, or
 /// another number type, does not compile; sizes known at run time are compared (Status::size_mismatch).
+///
+/// Models whose noise is not simply added say themselves how it enters, for the filters that follow it
+/// through the model (augmented_unscented.hpp, ensemble.hpp), which take the others as well:
+///
+/// ```cpp
+/// struct Driven {  // noise w enters through the motion
+///   using State = cairn::SE2;  using Control = cairn::Vector<2>;  using Noise = cairn::Vector<2>;
+///   State propagate(const State& x, const Control& u, const Noise& w, double dt) const;
+///   cairn::Matrix<2> noise(const State& x, const Control& u, double dt) const;  // covariance of w
+/// };
+/// struct Echo {  // noise v enters through the sensor
+///   using State = cairn::SE2;  using Measurement = cairn::Vector<1>;  using Noise = cairn::Vector<1>;
+///   Measurement predict(const State& x, const Noise& v) const;
+///   cairn::Matrix<1> noise(const State& x) const;  // covariance of v
+/// };
+/// ```
 #pragma once
 
 #include <concepts>
 
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/detail/explain_sizes.hpp>
 #include <cairn/filter/matrix_of.hpp>
 #include <cairn/manifold/manifold.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// The control of a process that has none.
 struct NoControl {};
@@ -102,6 +119,51 @@ template <class F, class H>
 concept StateModel =
     ProcessModel<F> && MeasurementModel<H> && std::same_as<typename F::State, typename H::State>;
 
+/// A process that says how its noise enters: propagate(x, u, w, dt), w ~ N(0, noise(x, u, dt)), a vector.
+template <class F>
+concept DrivenProcess = Manifold<typename F::State> && Manifold<typename F::Noise> &&
+                        requires(const F& f, const typename F::State& x, const typename F::Control& u,
+                                 const typename F::Noise& w, double dt) {
+                          { f.propagate(x, u, w, dt) } -> StateOf<typename F::State>;
+                          { f.noise(x, u, dt) } -> detail::CovarianceLike<typename F::Noise>;
+                        };
+
+/// A sensor that says how its noise enters: predict(x, v), v ~ N(0, noise(x)), a vector.
+template <class H>
+concept DrivenMeasurement =
+    Manifold<typename H::State> && Manifold<typename H::Measurement> && Manifold<typename H::Noise> &&
+    requires(const H& h, const typename H::State& x, const typename H::Noise& v) {
+      { h.predict(x, v) } -> StateOf<typename H::Measurement>;
+      { h.noise(x) } -> detail::CovarianceLike<typename H::Noise>;
+    };
+
+namespace detail {
+
+template <class F>
+struct NoiseOfProcess {
+  using type = Tangent<typename F::State>;
+};
+template <DrivenProcess F>
+struct NoiseOfProcess<F> {
+  using type = typename F::Noise;
+};
+template <class H>
+struct NoiseOfSensor {
+  using type = Tangent<typename H::Measurement>;
+};
+template <DrivenMeasurement H>
+struct NoiseOfSensor<H> {
+  using type = typename H::Noise;
+};
+
+}  // namespace detail
+
+/// Additive or driven.
+template <class F>
+concept AnyProcess = ProcessModel<F> || DrivenProcess<F>;
+template <class H>
+concept AnyMeasurement = MeasurementModel<H> || DrivenMeasurement<H>;
+
 namespace detail {
 
 /// A + B, where both are known at compile time.
@@ -140,4 +202,4 @@ template <class States>
 }
 
 }  // namespace detail
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -18,16 +18,17 @@
 #include <vector>
 
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/detail/covariance.hpp>
+#include <cairn/filter/detail/plain_model.hpp>
+#include <cairn/filter/detail/products.hpp>
 #include <cairn/filter/kalman.hpp>
-#include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/smoother.hpp>
 #include <cairn/filter/status.hpp>
-#include <cairn/filter/structure.hpp>
+#include <cairn/filter/structured.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// The process with another noise: the same covariance at every step.
 template <ProcessModel F>
@@ -203,4 +204,4 @@ template <class Filter = Kalman, class F, class H>
   return fit;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

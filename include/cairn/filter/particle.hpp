@@ -28,13 +28,14 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/random.hpp>
 #include <cairn/core/statistics.hpp>
+#include <cairn/filter/detail/covariance.hpp>
+#include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// How many copies of each particle survive: independent draws; one draw a stratum; one draw for all strata;
 /// whole copies first and the rest at random.
@@ -87,9 +88,9 @@ inline std::vector<double> sorted_uniforms(std::size_t count, Random& random) {
 
 }  // namespace detail
 
-/// `count` indices drawn in proportion to `weights`, of any sum above zero, in rising order. Every scheme draws
-/// index i count * weight_i times the sum's inverse on average; none where there are no weights. Throws Error
-/// naming a weight that is negative or not finite, or where all are zero. O(count + size).
+/// `count` indices drawn in proportion to `weights`, of any sum above zero, in rising order. Every scheme
+/// draws index i count * weight_i times the sum's inverse on average; none where there are no weights. Throws
+/// Error naming a weight that is negative or not finite, or where all are zero. O(count + size).
 [[nodiscard]] inline std::vector<std::size_t> resampled_indices(std::span<const double> weights,
                                                                 std::size_t count, Resampling scheme,
                                                                 Random& random) {
@@ -183,8 +184,8 @@ struct Particles {
     return Status::accepted;
   }
 
-  /// Draws `count` particles in proportion to the weights; all are equal afterwards. Throws Error, and nothing
-  /// is changed, where a weight is not a number or all are zero.
+  /// Draws `count` particles in proportion to the weights; all are equal afterwards. Throws Error, and
+  /// nothing is changed, where a weight is not a number or all are zero.
   void resample(std::size_t count, Resampling scheme, Random& random) {
     CAIRN_EXPECTS(log_weights.size() == size(), "particles need one weight each");
     std::vector<X> next;
@@ -328,4 +329,4 @@ struct ParticleFilter {
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -24,15 +24,15 @@
 
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/random.hpp>
+#include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/particle.hpp>
-#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// What the sensor reports of one part, given the sampled state.
 template <class H>
@@ -122,4 +122,4 @@ struct RaoBlackwell {
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

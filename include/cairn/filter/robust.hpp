@@ -29,15 +29,16 @@
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/detail/covariance.hpp>
+#include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
-#include <cairn/filter/structure.hpp>
+#include <cairn/filter/structured.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -67,8 +68,8 @@ struct Robust {
   Filter filter{};
   double limit = 9.0;  ///< NIS above which R is raised; > 0, usually a chi-square quantile
 
-  /// Like filter.update; where R was raised the innovation is that of the raised R. not_positive_definite where
-  /// no factor would do, as for R = 0.
+  /// Like filter.update; where R was raised the innovation is that of the raised R. not_positive_definite
+  /// where no factor would do, as for R = 0.
   template <class H, class V = typename H::Measurement>
     requires(MeasurementModel<H> || detail::explain_sizes<H>)
   auto update(Gaussian<typename H::State>& belief, const H& sensor, const V& z) const {
@@ -231,4 +232,4 @@ template <int M, class S>
   return r;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

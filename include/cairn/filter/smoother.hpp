@@ -6,8 +6,9 @@
 ///
 ///   G_k = C_k P(k+1|k)^-1,   C_k = cov(x_k, x_{k+1|k}),  which is P F^T where the process is linear
 ///   x(k|T) = x(k|k) (+) G_k (x(k+1|T) (-) x(k+1|k)),   P(k|T) = V_k + G_k P(k+1|T) G_k^T
-/// V_k is what would be left of P(k|k) if x(k+1) were known, P(k|k) - G_k P(k+1|k) G_k^T, as a sum of squares:
-/// with P(k|k) = L L^T, F L the image of L by the motion and everything else that P(k+1|k) consists of as W W^T,
+/// V_k is what would be left of P(k|k) if x(k+1) were known, P(k|k) - G_k P(k+1|k) G_k^T, as a sum of
+/// squares: with P(k|k) = L L^T, F L the image of L by the motion and everything else that P(k+1|k) consists
+/// of as W W^T,
 ///   V_k = (L - G_k F L)(L - G_k F L)^T + G_k W (G_k W)^T
 /// (H. Rauch, F. Tung, C. Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA Journal 3,
 /// 1965; S. Sarkka, "Unscented Rauch-Tung-Striebel smoother", IEEE Trans. Automatic Control 53, 2008.)
@@ -31,19 +32,20 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/array_update.hpp>
+#include <cairn/filter/detail/array_update.hpp>
+#include <cairn/filter/detail/covariance.hpp>
+#include <cairn/filter/detail/plain_model.hpp>
+#include <cairn/filter/detail/products.hpp>
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kalman.hpp>
-#include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/plain_model.hpp>
-#include <cairn/filter/sigma_points.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/filter/unscented.hpp>
+#include <cairn/filter/unscented_transform.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// One prediction as a smoother needs it: what was known before, what was predicted, and what the state after
 /// says about the state before.
@@ -57,8 +59,8 @@ struct RecordedStep {
 
 namespace detail {
 
-/// How a prediction made its covariance: image^T and rest, rows of an array whose squares they are. The first n
-/// rows are the images of the columns of `root`, the others stand for all that was added.
+/// How a prediction made its covariance: image^T and rest, rows of an array whose squares they are. The first
+/// n rows are the images of the columns of `root`, the others stand for all that was added.
 template <class X, class Array>
 void record_rows(RecordedStep<X>& step, const CovarianceOf<X>& root, Array& array) {
   using S = ScalarOf<X>;
@@ -230,4 +232,4 @@ private:
   std::vector<RecordedStep<X>> steps_;
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -8,7 +8,7 @@
 /// Every step is one orthogonal triangularisation of an array (no Cholesky downdate anywhere):
 ///   predict   [F L, Q^1/2] -> [L', 0]
 ///   update    [R^1/2  H L; 0  L] -> [S^1/2 0; K S^1/2  L']
-///   unscented the columns odd, even and m of sigma_points.hpp in place of F L and H L
+///   unscented the columns odd, even and m of unscented_transform.hpp in place of F L and H L
 /// (P. Kaminski, A. Bryson, S. Schmidt, "Discrete square root filtering", IEEE Trans. Automatic Control 16,
 /// 1971; R. van der Merwe, E. Wan, "The square-root unscented Kalman filter", ICASSP 2001.)
 #pragma once
@@ -21,17 +21,18 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/array_update.hpp>
-#include <cairn/filter/correct.hpp>
+#include <cairn/filter/detail/array_update.hpp>
+#include <cairn/filter/detail/covariance.hpp>
+#include <cairn/filter/detail/plain_model.hpp>
+#include <cairn/filter/detail/products.hpp>
+#include <cairn/filter/detail/update.hpp>
 #include <cairn/filter/gaussian.hpp>
-#include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/plain_model.hpp>
-#include <cairn/filter/sigma_points.hpp>
 #include <cairn/filter/status.hpp>
+#include <cairn/filter/unscented_transform.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Truth = retract(mean, d), d ~ N(0, root root^T), root lower triangular.
 template <Manifold X>
@@ -50,9 +51,7 @@ struct SquareRootGaussian {
     return result;
   }
   /// Symmetric bit for bit.
-  [[nodiscard]] CovarianceOf<X> covariance() const {
-    return detail::squared_root<dof<X>, ScalarOf<X>>(root);
-  }
+  [[nodiscard]] CovarianceOf<X> covariance() const { return detail::squared_root<dof<X>, ScalarOf<X>>(root); }
   [[nodiscard]] Gaussian<X> gaussian() const { return {mean, covariance()}; }
 };
 
@@ -71,12 +70,10 @@ Status keep_root(SquareRootGaussian<X>& belief, const X& mean, const Array& arra
 /// The update from a filled array of M + N columns, [S-part; P-part] transposed, with the noise's root in it.
 /// `good`: that is one.
 template <Manifold X, int M, class Array>
-[[nodiscard]] Innovation<M, ScalarOf<X>> correct_by_array(SquareRootGaussian<X>& belief, Array& array,
-                                                          const Vector<M, ScalarOf<X>>& residual,
-                                                          const Matrix<M, dof<X>, ScalarOf<X>>& h,
-                                                          const Matrix<M, M, ScalarOf<X>>& r, double gate,
-                                                          bool good,
-                                                          ScalarOf<X> digits = root_digits_left<ScalarOf<X>>) {
+[[nodiscard]] Innovation<M, ScalarOf<X>> correct_by_array(
+    SquareRootGaussian<X>& belief, Array& array, const Vector<M, ScalarOf<X>>& residual,
+    const Matrix<M, dof<X>, ScalarOf<X>>& h, const Matrix<M, M, ScalarOf<X>>& r, double gate, bool good,
+    ScalarOf<X> digits = root_digits_left<ScalarOf<X>>) {
   using S = ScalarOf<X>;
   const int m = static_cast<int>(residual.size());
   auto in = fresh_innovation<M, S>(residual, Matrix<M, M, S>::Zero(m, m));
@@ -86,10 +83,10 @@ template <Manifold X, int M, class Array>
   else if (!finite_numbers || !good)
     in.status = finite_numbers ? Status::not_positive_definite : Status::not_finite;
   if (in.status != Status::accepted) return in;
-  const auto update =
-      update_by_array<dof<X>, M, S>(array, residual, static_cast<int>(belief.root.rows()));
+  const auto update = update_by_array<dof<X>, M, S>(array, residual, static_cast<int>(belief.root.rows()));
   in.status = judge_array(update, in, gate);
-  if (in.status == Status::accepted && !determined<dof<X>, M, S>(update, belief.root, h, r, KeptAs::root, digits))
+  if (in.status == Status::accepted &&
+      !determined<dof<X>, M, S>(update, belief.root, h, r, KeptAs::root, digits))
     in.status = Status::not_positive_definite;
   if (in.status != Status::accepted) return in;
   belief.mean = retract(belief.mean, Tangent<X>(update.step));
@@ -243,8 +240,8 @@ struct SquareRootUnscented {
     const S digits = detail::digits_of_points(
         belief.mean, [&](int i, int) { return variances(ms + i); }, mean,
         [&](int i, int) { return variances(i); });
-    return detail::correct_by_array<X, m>(belief, array, local(mean, plain.z()), slope, r, sound(ns) ? gate : 0.0, good,
-                                          digits);
+    return detail::correct_by_array<X, m>(belief, array, local(mean, plain.z()), slope, r,
+                                          sound(ns) ? gate : 0.0, good, digits);
   }
 
 private:
@@ -260,4 +257,4 @@ private:
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -19,16 +19,16 @@
 #include <optional>
 
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/detail/plain_model.hpp>
+#include <cairn/filter/detail/products.hpp>
+#include <cairn/filter/detail/update.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/information.hpp>
-#include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/correct.hpp>
-#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Truth = retract(point, d); the density of d is exp(-|R d - b|^2 / 2), R upper triangular and possibly
 /// singular.
@@ -194,4 +194,4 @@ private:
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -16,7 +16,7 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Verdict of one predict or update.
 enum class [[nodiscard]] Status {
@@ -90,4 +90,4 @@ struct [[nodiscard]] Innovation {
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

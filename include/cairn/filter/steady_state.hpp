@@ -21,15 +21,15 @@
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/array_update.hpp>
-#include <cairn/filter/correct.hpp>
+#include <cairn/filter/detail/array_update.hpp>
+#include <cairn/filter/detail/update.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/information.hpp>
 #include <cairn/filter/matrix_of.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// What a Kalman filter settles to. Where it is not accepted the matrices are of no use.
 template <int N, int M, class S = double>
@@ -73,9 +73,9 @@ template <int N, class S>
 
 }  // namespace detail
 
-/// Steady state of x' = F x + noise(Q), z = H x + noise(R). Refused: not_converged, where no filter settles (a
-/// state that does not decay and is not seen, or is not driven) or the equation is not solved to half of the
-/// digits; not_positive_definite, where R is not, or Q is no covariance.
+/// Steady state of x' = F x + noise(Q), z = H x + noise(R). Refused: not_converged, where no filter settles
+/// (a state that does not decay and is not seen, or is not driven) or the equation is not solved to half of
+/// the digits; not_positive_definite, where R is not, or Q is no covariance.
 template <int N, int M, class S>
 [[nodiscard]] SteadyState<N, M, S> steady_state(const Matrix<N, N, S>& f, const Matrix<M, N, S>& h,
                                                 const Matrix<N, N, S>& q, const Matrix<M, M, S>& r) {
@@ -135,8 +135,8 @@ template <int N, int M, class S>
       for (int k = j + 1; k < m; ++k) sum -= result.gain(i, k) * update.root_s(k, j);
       result.gain(i, j) = sum / update.root_s(j, j);
     }
-  const Matrix<N, N, S> next =
-      symmetrised(detail::column_product(f, detail::column_product(result.updated, transposed<N, N, S>(f))) + q);
+  const Matrix<N, N, S> next = symmetrised(
+      detail::column_product(f, detail::column_product(result.updated, transposed<N, N, S>(f))) + q);
   const S tolerance = sqrt(std::numeric_limits<S>::epsilon());
   for (int i = 0; i < n; ++i)
     for (int j = 0; j <= i; ++j) {
@@ -177,4 +177,4 @@ template <class F, class H, class Q, class R, class S = typename detail::ShapeOf
   return steady_state(plain_f, plain_h, plain_q, plain_r);
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

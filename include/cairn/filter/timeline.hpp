@@ -28,13 +28,13 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// A belief in time under one process and the sensors H. Allocates; not safe for concurrent use.
 template <class Filter, class F, class... H>
@@ -201,4 +201,4 @@ private:
   std::vector<Event> events_;
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

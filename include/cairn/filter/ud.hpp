@@ -17,16 +17,17 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/correct.hpp>
+#include <cairn/filter/detail/covariance.hpp>
+#include <cairn/filter/detail/plain_model.hpp>
+#include <cairn/filter/detail/products.hpp>
+#include <cairn/filter/detail/thornton_bierman.hpp>
+#include <cairn/filter/detail/update.hpp>
 #include <cairn/filter/gaussian.hpp>
-#include <cairn/filter/kernels.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/plain_model.hpp>
 #include <cairn/filter/status.hpp>
-#include <cairn/filter/ud_kernels.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Truth = retract(mean, d), d ~ N(0, U diag(D) U^T). Sizes are fixed at compile time.
 template <Manifold X>
@@ -253,7 +254,8 @@ private:
     }
   }
   template <int N, class S>
-  static Status factor_dense(const Matrix<N, N, S>& q, detail::Column<N, S> (&w)[2 * N], S (&weights)[2 * N]) {
+  static Status factor_dense(const Matrix<N, N, S>& q, detail::Column<N, S> (&w)[2 * N],
+                             S (&weights)[2 * N]) {
     Matrix<N, N, S> upper;
     Vector<N, S> diagonal = Vector<N, S>::Zero();
     if (!detail::ud_factor<N, S>(q, upper, diagonal))
@@ -294,4 +296,4 @@ private:
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -10,7 +10,7 @@
 /// (S. Julier, J. Uhlmann, "Unscented filtering and nonlinear estimation", Proc. IEEE 92, 2004; I.
 /// Arasaratnam, S. Haykin, "Cubature Kalman filters", IEEE Trans. Automatic Control 54, 2009.) On a linear
 /// model this is the Kalman filter for every alpha, beta and kappa. Noise that is not additive:
-/// augmented.hpp.
+/// augmented_unscented.hpp.
 #pragma once
 
 #include <concepts>
@@ -19,16 +19,17 @@
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/array_update.hpp>
-#include <cairn/filter/correct.hpp>
+#include <cairn/filter/detail/array_update.hpp>
+#include <cairn/filter/detail/covariance.hpp>
+#include <cairn/filter/detail/update.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/sigma_points.hpp>
 #include <cairn/filter/status.hpp>
-#include <cairn/filter/wide.hpp>
+#include <cairn/filter/unscented_transform.hpp>
+#include <cairn/filter/vectorised.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -48,9 +49,9 @@ template <Manifold X, int M, class S, class Again>
   const bool sound = regular && digits < S(1);
   in.nis = c.take(in.residual.data(), out.step);
   lower_by_squares(p, c.w);
-  const bool good = sound && gate > 0.0 && in.nis <= static_cast<S>(gate) &&
-                    in.nis <= std::numeric_limits<S>::max() && keeps_digits<n, S>(p, belief.covariance, digits) &&
-                    is_covariance(p) && finite_state(belief.mean);
+  const bool good =
+      sound && gate > 0.0 && in.nis <= static_cast<S>(gate) && in.nis <= std::numeric_limits<S>::max() &&
+      keeps_digits<n, S>(p, belief.covariance, digits) && is_covariance(p) && finite_state(belief.mean);
   if (!good) [[unlikely]] {
     out.innovation = in;
     if (finite_state(belief.mean))
@@ -125,7 +126,7 @@ struct Unscented {
     const double c2 = points.spread_squared(n);
     if (!(fading >= 1.0) || !(stabilising_noise >= 0.0) || !(c2 > 0.0)) return Status::bad_option;
     const auto f = [&](const auto& x) { return plain.propagate(x, dt); };
-    const detail::PointFunction<detail::is_wide<F>, decltype(f)> points_to{f};
+    const detail::PointFunction<detail::is_vectorised<F>, decltype(f)> points_to{f};
     decltype(auto) q = plain.noise(belief.mean, dt);
     if (plain.misfit()) return Status::size_mismatch;
     return advance(belief, plain, points_to, q, c2);
@@ -151,7 +152,7 @@ struct Unscented {
     const double c2 = points.spread_squared(size);
     if (!(c2 > 0.0)) return refused(belief, plain, Status::bad_option);
     const auto f = [&](const auto& x) { return plain.predict(x); };
-    const detail::PointFunction<detail::is_wide<H>, decltype(f)> h{f};
+    const detail::PointFunction<detail::is_vectorised<H>, decltype(f)> h{f};
     if constexpr (dof<X> == dynamic || m == dynamic) {
       CovarianceOf<X> root = belief.covariance;
       if (!detail::checked_root<dof<X>, S>(belief.covariance, root))
@@ -216,8 +217,8 @@ private:
       if (!all_finite(array)) return Status::not_positive_definite;
       const Matrix<M, n, S> slope = detail::mean_slope<M, n, S>(array, root, ms);
       update = detail::update_by_array<n, M, S>(array, in.residual, ns);
-      const bool good = update.regular &&
-                        detail::determined<n, M, S>(update, root, slope, r, detail::KeptAs::covariance, digits);
+      const bool good = update.regular && detail::determined<n, M, S>(update, root, slope, r,
+                                                                      detail::KeptAs::covariance, digits);
       return good ? Status::accepted : Status::not_positive_definite;
     };
   }
@@ -311,4 +312,4 @@ private:
   return {.points = {.alpha = 1.0, .beta = 0.0, .kappa = 0.0}};
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -27,7 +27,7 @@
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 enum class AlignmentStatus {
   good,
@@ -286,4 +286,4 @@ inline void alignment_covariance(const AlignmentMoments& m, double scale, bool d
   return result;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -30,7 +30,7 @@
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// A left and a right pixel of the same point.
 struct PixelPair {
@@ -212,4 +212,4 @@ private:
   Matrix<5> covariance_;
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -33,7 +33,7 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// What a calibration says about one camera. Focal lengths and principal point in pixels.
 struct PinholeParameters {
@@ -290,4 +290,4 @@ private:
   double farthest_image_squared_ = std::numeric_limits<double>::max();
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

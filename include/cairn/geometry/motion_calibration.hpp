@@ -28,13 +28,13 @@
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
-#include <cairn/geometry/pose_equations.hpp>
+#include <cairn/geometry/detail/pose_equations.hpp>
 #include <cairn/geometry/rig_correction.hpp>
 #include <cairn/geometry/triangulation.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// A point that both cameras saw before and after a motion.
 struct MovedPair {
@@ -283,4 +283,4 @@ private:
   return result;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

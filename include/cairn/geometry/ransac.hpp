@@ -29,7 +29,7 @@
 #include <cairn/core/random.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// How well a model fits.
 struct RansacScore {
@@ -202,4 +202,4 @@ template <RansacProblem P>
   return best;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -19,7 +19,7 @@
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// The rigs around a nominal one, which needs a baseline.
 class RigCorrection {
@@ -63,4 +63,4 @@ private:
   Matrix<3> axes_;  // u1, u2, u3
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

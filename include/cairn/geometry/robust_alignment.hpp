@@ -24,12 +24,12 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/geometry/alignment.hpp>
-#include <cairn/geometry/pose_equations.hpp>
+#include <cairn/geometry/detail/pose_equations.hpp>
 #include <cairn/geometry/ransac.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// The same point in two frames.
 struct PointMatch {
@@ -225,4 +225,4 @@ private:
   return result;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -23,15 +23,17 @@
 #include <vector>
 
 #include <cairn/core/linalg.hpp>
-#include <cairn/geometry/pose_equations.hpp>
+#include <cairn/geometry/detail/pose_equations.hpp>
+#include <cairn/geometry/detail/stereo_pose_problem.hpp>
+#include <cairn/geometry/detail/stereo_residual.hpp>
 #include <cairn/geometry/ransac.hpp>
-#include <cairn/geometry/stereo_pose_problem.hpp>
-#include <cairn/geometry/stereo_residual.hpp>
+#include <cairn/geometry/stereo_match.hpp>
+#include <cairn/geometry/stereo_pose_options.hpp>
 #include <cairn/geometry/stereo_rig.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 enum class StereoPoseStatus {
   good,
@@ -121,4 +123,4 @@ inline void finish_stereo_pose(const StereoPoseProblem& problem, SE3 pose, const
   return result;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

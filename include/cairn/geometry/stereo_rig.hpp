@@ -20,7 +20,7 @@
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Where a point appears in both images: left u, v, right u, v.
 struct StereoPixelsWithJacobian {
@@ -137,4 +137,4 @@ private:
   return EpipolarConstraint(rig).distance(*l, *r);
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -28,7 +28,7 @@
 #include <cairn/manifold/so3.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 enum class TriangulationMethod { midpoint, weighted_midpoint, gauss_newton };
 
@@ -239,4 +239,4 @@ private:
   return Triangulator(rig, options)(left, right);
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

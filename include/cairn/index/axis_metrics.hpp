@@ -27,7 +27,7 @@
 #include <cairn/core/check.hpp>
 #include <cairn/index/metric.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -139,4 +139,4 @@ struct Circular {
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -20,7 +20,7 @@
 
 #include <cairn/index/kd_tree.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// How many leaves (of up to 16 points) a search may scan.
 struct Budget {
@@ -181,4 +181,4 @@ private:
   std::vector<Real> wrapped_;
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -12,7 +12,7 @@
 
 #include <cairn/index/kd_tree.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -104,4 +104,4 @@ template <class Scalar, std::size_t Dim, class M, Point Low, Point High>
   return found;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

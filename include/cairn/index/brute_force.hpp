@@ -12,12 +12,12 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
-#include <cairn/index/block_lanes.hpp>
+#include <cairn/index/collectors.hpp>
+#include <cairn/index/detail/block_lanes.hpp>
 #include <cairn/index/metric.hpp>
-#include <cairn/index/neighbors.hpp>
 #include <cairn/index/points.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// The interface of KdTree, in O(n) a query and without a build. Owns a copy of the points.
 template <class Scalar = float, std::size_t Dim = dynamic_dim, class M = L2>
@@ -102,4 +102,4 @@ private:
 template <PointSet Points, class M = L2>
 BruteForce(const Points&, M = {}) -> BruteForce<detail::CoordinateOf<Points>, dynamic_dim, M>;
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

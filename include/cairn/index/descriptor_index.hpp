@@ -12,7 +12,7 @@
 /// search.search(index, query, two, {.leaves = 64});
 /// ```
 ///
-/// The cells begin as those of a kd-tree and are moved to their means (mean_cells.hpp). A query asks for its
+/// The cells begin as those of a kd-tree and are moved to their means (k_means.hpp). A query asks for its
 /// distance from all means and scans the nearest cells first (an inverted file: Jegou, Douze, Schmid,
 /// "Product quantization for nearest neighbor search", IEEE PAMI 33, 2011, section IV): in so many dimensions
 /// the distance from a cell's middle says more about where near points are than that from its border.
@@ -34,13 +34,13 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/index/best_bin_first.hpp>
-#include <cairn/index/byte_blocks.hpp>
-#include <cairn/index/mean_cells.hpp>
+#include <cairn/index/collectors.hpp>
+#include <cairn/index/detail/byte_blocks.hpp>
+#include <cairn/index/detail/k_means.hpp>
 #include <cairn/index/metric.hpp>
-#include <cairn/index/neighbors.hpp>
 #include <cairn/index/points.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 struct DescriptorIndexOptions {
   /// Mean number of points in a cell, up to a factor of 1.5. 0: sqrt(n) / 6, but at least 32, where scanning
@@ -73,7 +73,7 @@ public:
             ? options.points_in_cell
             : std::max<std::size_t>(2 * detail::block_size,
                                     static_cast<std::size_t>(std::sqrt(static_cast<double>(size_)) / 6));
-    detail::MeanCellsBuilder builder(codes, dimension(), options.threads);
+    detail::KMeansBuilder builder(codes, dimension(), options.threads);
     fill(codes, builder.build(depth_for(in_cell), options.rounds));
   }
   explicit DescriptorIndex(const Points&&, const DescriptorIndexOptions& = {}) = delete;  ///< would be gone
@@ -280,7 +280,7 @@ private:
     return exact ? 0 : std::sqrt(sum) * 1.001F + 1e-3F;
   }
 
-  void fill(const std::vector<std::uint8_t>& codes, const detail::MeanCells& cells) {
+  void fill(const std::vector<std::uint8_t>& codes, const detail::KMeans& cells) {
     const std::size_t dim = dimension();
     const auto mean_of = [&](std::size_t cell) { return &cells.means[cell * dim]; };
     means_ = detail::ByteBlocks::of_rows(dim, cells.size(), mean_of);
@@ -333,4 +333,4 @@ private:
   std::vector<float> radii_;              ///< how far a cell's points are from its mean at most, in bytes
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

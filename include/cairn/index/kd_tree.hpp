@@ -32,16 +32,16 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
-#include <cairn/index/box_tree.hpp>
-#include <cairn/index/kd_builder.hpp>
-#include <cairn/index/kd_layout.hpp>
-#include <cairn/index/leaf_blocks.hpp>
+#include <cairn/index/collectors.hpp>
+#include <cairn/index/detail/box_tree.hpp>
+#include <cairn/index/detail/kd_builder.hpp>
+#include <cairn/index/detail/kd_layout.hpp>
+#include <cairn/index/detail/leaf_blocks.hpp>
+#include <cairn/index/detail/point_ids.hpp>
 #include <cairn/index/metric.hpp>
-#include <cairn/index/neighbors.hpp>
-#include <cairn/index/point_ids.hpp>
 #include <cairn/index/points.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// How a tree is built. The tree is the same for any number of threads (0 counts as 1).
 struct BuildOptions {
@@ -262,4 +262,4 @@ template <PointSet Points, std::convertible_to<std::span<const PointId>> Ids, cl
 KdTree(const Points&, const Ids&, M = {}, BuildOptions = {})
     -> KdTree<detail::CoordinateOf<Points>, dynamic_dim, M>;
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

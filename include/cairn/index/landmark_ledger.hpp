@@ -14,9 +14,9 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
-#include <cairn/index/neighbors.hpp>
+#include <cairn/index/collectors.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 using LandmarkId = PointId;
 
@@ -166,4 +166,4 @@ private:
   std::size_t base_size_ = 0;
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -37,7 +37,7 @@
 
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// What a search needs to know of a distance. `difference` is a coordinate of the query minus that of a
 /// point, `axis` its number.
@@ -227,4 +227,4 @@ template <class M, class Real>
 
 }  // namespace detail
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -19,7 +19,8 @@
 /// map.erase(first);                                          // found by nothing from here on
 /// cairn::BestBinFirst<cairn::MultiKdTree<float, 3>> search;  // under a budget; keep one for many searches
 /// search.search(map, query, collector, {.leaves = 24});
-/// for (const cairn::PointId id : cairn::inside(map, low, high)) use(id);  // and NearestFirst order(map, query)
+/// for (const cairn::PointId id : cairn::inside(map, low, high)) use(id);  // and NearestFirst order(map,
+/// query)
 /// ```
 ///
 /// Const methods may run at the same time, on any threads, also while a merge is under way in the background;
@@ -38,13 +39,13 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
-#include <cairn/index/forest_queries.hpp>
-#include <cairn/index/forest_search.hpp>
+#include <cairn/index/detail/forest_queries.hpp>
+#include <cairn/index/detail/lockstep_search.hpp>
+#include <cairn/index/detail/logarithmic_forest.hpp>
 #include <cairn/index/kd_tree.hpp>
 #include <cairn/index/multi_tree_shape.hpp>
-#include <cairn/index/tree_forest.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -271,7 +272,7 @@ private:
 
   [[no_unique_address]] M metric_;
   std::size_t dim_ = 0;
-  detail::TreeForest<Tree> forest_;
+  detail::LogarithmicForest<Tree> forest_;
   std::vector<PointState> state_;
   std::size_t live_ = 0;
   std::uint64_t updates_ = 0;  ///< points inserted and erased so far
@@ -280,4 +281,4 @@ private:
 /// Coordinates that nobody named would be rounded to some type's.
 MultiKdTree(MultiTreeShape = {}) -> MultiKdTree<detail::Unsaid>;
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

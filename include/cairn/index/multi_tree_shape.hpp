@@ -14,9 +14,9 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
-#include <cairn/index/kd_layout.hpp>
+#include <cairn/index/detail/kd_layout.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// When trees are merged.
 enum class MergeRule {
@@ -101,4 +101,4 @@ inline void check_shape(const MultiTreeShape& shape) {
 
 }  // namespace detail
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

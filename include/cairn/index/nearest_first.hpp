@@ -22,7 +22,7 @@
 
 #include <cairn/index/kd_tree.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Refers to the tree, which must live longer. The k-th call costs as much as it takes to be sure of the k-th
 /// nearest; memory grows with the leaves visited.
@@ -120,4 +120,4 @@ private:
   std::vector<Hit> hits_;  ///< reduced distances
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

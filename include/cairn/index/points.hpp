@@ -29,7 +29,7 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/sizes.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Dimension that is known at run time only.
 inline constexpr std::size_t dynamic_dim = 0;
@@ -366,4 +366,4 @@ template <class Scalar, PointSet Points>
 
 }  // namespace detail
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

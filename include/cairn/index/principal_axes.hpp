@@ -20,10 +20,10 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/sizes.hpp>
-#include <cairn/index/block_lanes.hpp>
+#include <cairn/index/detail/block_lanes.hpp>
 #include <cairn/index/points.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// A rotation of dim numbers. Const methods may run at the same time.
 class PrincipalAxes {
@@ -143,4 +143,4 @@ private:
   std::vector<float> columns_;
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

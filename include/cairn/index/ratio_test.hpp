@@ -13,10 +13,10 @@
 #include <utility>
 
 #include <cairn/core/check.hpp>
+#include <cairn/index/collectors.hpp>
 #include <cairn/index/metric.hpp>
-#include <cairn/index/neighbors.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Accept when the second is clearly farther than the first and first <= max_distance, in true distances.
 ///
@@ -138,4 +138,4 @@ public:
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

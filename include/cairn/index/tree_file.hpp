@@ -30,11 +30,11 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/index/detail/point_ids.hpp>
 #include <cairn/index/kd_tree.hpp>
-#include <cairn/index/point_ids.hpp>
 #include <cairn/index/points.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -144,4 +144,4 @@ template <class Tree, class Scalar = typename Tree::Coordinate>
   return Tree::from_rows(std::move(rows), rows_dim, ids, std::move(metric));
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -30,7 +30,7 @@
 #include <cairn/core/check.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -237,4 +237,4 @@ inline void write_file_atomically(const std::filesystem::path& path, std::string
   check(part.deliver());
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

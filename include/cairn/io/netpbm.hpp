@@ -26,7 +26,7 @@
 #include <cairn/version.hpp>
 #include <cairn/vision/image.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// An image as its file has it: rows from the top, samples of a pixel side by side.
 struct Netpbm {
@@ -182,4 +182,4 @@ inline void write_netpbm(const std::filesystem::path& path, const Netpbm& image)
   write_file_atomically(path, bytes);
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

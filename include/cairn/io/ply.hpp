@@ -25,7 +25,7 @@
 #include <cairn/io/file.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// One column of a point cloud: a name without blanks and a value for each point. Does not own the values.
 struct PlyProperty {
@@ -104,4 +104,4 @@ inline void write_ply(const std::filesystem::path& path, std::span<const PlyProp
   write_file_atomically(path, ply_bytes(properties, comments));
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -23,7 +23,7 @@
 #include <cairn/io/file.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// `text` without blanks (space, tab, carriage return) at both ends.
 [[nodiscard]] inline std::string_view trimmed(std::string_view text) noexcept {
@@ -126,4 +126,4 @@ private:
   std::size_t number_ = 0;
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

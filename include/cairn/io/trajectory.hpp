@@ -35,7 +35,7 @@
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Where the body was at a time.
 struct StampedPose {
@@ -242,4 +242,4 @@ inline void write_euroc(const std::filesystem::path& path, const Trajectory& tra
   write_file_atomically(path, text);
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

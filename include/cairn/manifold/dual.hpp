@@ -14,7 +14,7 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// A number of type S and its derivatives by N variables. Comparisons look at the value alone.
 template <class S, int N>
@@ -117,7 +117,7 @@ struct Dual {
   friend Dual floor(const Dual& a) { return Dual(std::floor(a.value)); }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI
 
 /// Lets Eigen's vectors and matrices hold duals.
 template <class S, int N>

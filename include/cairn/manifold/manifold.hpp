@@ -21,7 +21,7 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Teaches cairn a state type X. A specialisation has
 ///   using Scalar   the number type,
@@ -124,4 +124,4 @@ struct manifold_traits<Eigen::Matrix<S, N, 1, Options, MaxRows, MaxColumns>> {
   static Tangent local(const State& x, const State& y) { return y - x; }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -19,7 +19,7 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// W numbers of type S, float or double; W a power of two. Uninitialised by default, like S itself.
 template <class S, int W>
@@ -105,7 +105,7 @@ inline constexpr int pack_width =
 #endif
 
 }  // namespace detail
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI
 
 /// Lets Eigen's vectors hold packs.
 template <class S, int W>

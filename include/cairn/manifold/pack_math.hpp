@@ -17,7 +17,7 @@
 #include <cairn/manifold/pack.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -157,4 +157,4 @@ template <class S, int W>
   return select(inside, a, a - turns * P(S(2) * pi));
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

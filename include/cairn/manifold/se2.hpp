@@ -16,7 +16,7 @@
 #include <cairn/manifold/so2.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// A pose in the plane.
 template <class S = double>
@@ -111,4 +111,4 @@ struct manifold_traits<BasicSE2<S>> {
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

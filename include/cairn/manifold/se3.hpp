@@ -16,12 +16,12 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/manifold/detail/stumpff.hpp>
 #include <cairn/manifold/manifold.hpp>
 #include <cairn/manifold/so3.hpp>
-#include <cairn/manifold/stumpff.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// A rigid motion, or pose.
 template <class S = double>
@@ -123,7 +123,7 @@ private:
   // Q(rho, w) of (3).
   [[nodiscard]] static Matrix<3, 3, S> coupling(const Tangent& d) {
     const Vector<3, S> omega = rotation_of(d);
-    const Stumpff<S> f = stumpff<S>(omega.squaredNorm());
+    const detail::Stumpff<S> f = detail::stumpff<S>(omega.squaredNorm());
     const S last = S(0.5) * (f.c[4] - S(3) * f.c[5]);
     const Matrix<3, 3, S> P = skew(translation_of(d)), W = skew(omega);
     const Matrix<3, 3, S> WP = product(W, P), PW = product(P, W), WPW = product(WP, W);
@@ -153,4 +153,4 @@ struct manifold_traits<BasicSE3<S>> {
   static Tangent local(const BasicSE3<S>& x, const BasicSE3<S>& y) { return (x.inverse() * y).log(); }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

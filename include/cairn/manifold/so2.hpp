@@ -13,7 +13,7 @@
 #include <cairn/manifold/manifold.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -88,4 +88,4 @@ struct manifold_traits<BasicSO2<S>> {
   static bool finite(const BasicSO2<S>& x) { return x.angle() - x.angle() == S(0); }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -17,11 +17,11 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/manifold/detail/stumpff.hpp>
 #include <cairn/manifold/manifold.hpp>
-#include <cairn/manifold/stumpff.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -89,7 +89,7 @@ public:
 
   /// Rotation by |omega| about omega. (1)
   [[nodiscard]] static BasicSO3 exp(const Tangent& omega) {
-    const Stumpff<S> half = stumpff<S>(omega.squaredNorm() / S(4));
+    const detail::Stumpff<S> half = detail::stumpff<S>(omega.squaredNorm() / S(4));
     return BasicSO3(half.c[0], omega * (half.c[1] / S(2))).renormalised();
   }
 
@@ -149,7 +149,7 @@ public:
   [[nodiscard]] Matrix<3, 3, S> adjoint() const { return matrix(); }
 
   [[nodiscard]] static Matrix<3, 3, S> left_jacobian(const Tangent& omega) {  // (2)
-    const Stumpff<S> f = stumpff<S>(omega.squaredNorm());
+    const detail::Stumpff<S> f = detail::stumpff<S>(omega.squaredNorm());
     return polynomial(f.c[2], f.c[3], omega);
   }
   [[nodiscard]] static Matrix<3, 3, S> right_jacobian(const Tangent& omega) {  // (3)
@@ -158,7 +158,7 @@ public:
 
   /// Inverse of left_jacobian; finite for |omega| < 2 pi.
   [[nodiscard]] static Matrix<3, 3, S> left_jacobian_inverse(const Tangent& omega) {
-    const Stumpff<S> f = stumpff<S>(omega.squaredNorm());
+    const detail::Stumpff<S> f = detail::stumpff<S>(omega.squaredNorm());
     const S quadratic = (f.c[3] - S(2) * f.c[4]) / (S(2) * f.c[2]);  // = (1 - c_1 / (2 c_2)) / a^2
     return polynomial(S(-0.5), quadratic, omega);
   }
@@ -235,4 +235,4 @@ struct manifold_traits<BasicSO3<S>> {
   static Tangent local(const BasicSO3<S>& x, const BasicSO3<S>& y) { return (x.inverse() * y).log(); }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -11,11 +11,11 @@
 #pragma once
 
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/kernels.hpp>
+#include <cairn/filter/affine.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// x' = F x + offset + noise(Q), for N states.
 template <int N, class S = double>
@@ -84,4 +84,4 @@ struct LinearSensor {
   [[nodiscard]] const Matrix<M, M, S>& noise(const State&) const { return covariance; }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

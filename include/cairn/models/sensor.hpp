@@ -10,13 +10,13 @@
 
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/model.hpp>
-#include <cairn/filter/structure.hpp>
+#include <cairn/filter/structured.hpp>
 #include <cairn/manifold/product.hpp>
 #include <cairn/manifold/se2.hpp>
 #include <cairn/manifold/so2.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -107,4 +107,4 @@ struct PlanarPosition {
   [[nodiscard]] Matrix<2> noise(const State&) const { return sigma * sigma * Matrix<2>::Identity(); }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

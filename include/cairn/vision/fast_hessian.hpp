@@ -21,12 +21,12 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/parallel.hpp>
 #include <cairn/version.hpp>
-#include <cairn/vision/box_hessian.hpp>
+#include <cairn/vision/detail/box_hessian.hpp>
+#include <cairn/vision/detail/octave_scanner.hpp>
 #include <cairn/vision/features.hpp>
 #include <cairn/vision/integral_image.hpp>
-#include <cairn/vision/octave_scanner.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 struct FastHessianOptions {
   int octaves = 4;          ///< 1..5: scales double with each
@@ -103,4 +103,4 @@ private:
   std::vector<std::vector<Keypoint>> found_;
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -20,7 +20,7 @@
 #include <cairn/version.hpp>
 #include <cairn/vision/image.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// A blob in an image.
 struct Keypoint {
@@ -69,4 +69,4 @@ concept FeatureExtractor = requires(E& extractor, ImageView image) {
   { extractor(image) } -> std::convertible_to<const Features&>;
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -23,7 +23,7 @@
 #include <cairn/core/sizes.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
@@ -135,4 +135,4 @@ private:
   std::vector<std::uint8_t> pixels_;
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

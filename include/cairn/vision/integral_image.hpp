@@ -24,7 +24,7 @@
 #include <cairn/version.hpp>
 #include <cairn/vision/image.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// The table of one image; assign() reuses its memory for the next one. Const functions are safe
 /// concurrently.
@@ -82,4 +82,4 @@ private:
   std::vector<std::uint32_t> sums_;
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

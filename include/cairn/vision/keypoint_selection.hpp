@@ -16,7 +16,7 @@
 #include <cairn/version.hpp>
 #include <cairn/vision/features.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Total order by falling response / scale; place and scale settle ties, so that the outcome does not depend
 /// on the order of arrival. The scale counts because a blob is located with an error that grows with it:
@@ -91,4 +91,4 @@ struct AdaptiveThreshold {
   }
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -25,15 +25,15 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/parallel.hpp>
 #include <cairn/version.hpp>
+#include <cairn/vision/detail/surf_descriptor.hpp>
+#include <cairn/vision/detail/surf_orientation.hpp>
 #include <cairn/vision/fast_hessian.hpp>
 #include <cairn/vision/features.hpp>
 #include <cairn/vision/image.hpp>
 #include <cairn/vision/integral_image.hpp>
 #include <cairn/vision/keypoint_selection.hpp>
-#include <cairn/vision/surf_descriptor.hpp>
-#include <cairn/vision/surf_orientation.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Thresholds of other programs in the unit used here, (grey levels)^2 with the filters divided by their
 /// area. OpenSURF scales the image to 0..1; OpenCV divides each box by its own area and weighs Dxy more, so
@@ -44,6 +44,9 @@ namespace cairn::inline CAIRN_ABI {
 [[nodiscard]] constexpr float threshold_from_opencv(float threshold) noexcept {
   return threshold / 29.16F;
 }
+
+/// Sub-regions of the descriptor: those of Bay et al., or those of M-SURF, which overlap.
+enum class SurfLayout { plain, overlapping };
 
 struct SurfOptions {
   bool upright = false;  ///< leave out the direction: faster and more distinct where the camera does not roll
@@ -154,8 +157,8 @@ private:
     parallel_for(features.size(), threads_, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         Keypoint& keypoint = features.keypoints[i];
-        detail::describe_keypoint(sums_, keypoint, find_angle, options_.layout, options_.extended,
-                                  features.descriptors.data() + i * columns);
+        detail::describe_keypoint(sums_, keypoint, find_angle, options_.layout == SurfLayout::overlapping,
+                                  options_.extended, features.descriptors.data() + i * columns);
         keypoint.at_rim = detail::reaches_over_rim(sums_, keypoint);
       }
     });
@@ -176,4 +179,4 @@ private:
 
 static_assert(FeatureExtractor<Surf> && Detector<Surf> && Descriptor<Surf>);
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

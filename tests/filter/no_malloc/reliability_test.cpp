@@ -10,6 +10,7 @@
 
 #include <cairn/core/random.hpp>
 #include <cairn/filter/constraint.hpp>
+#include <cairn/filter/detail/covariance.hpp>
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/kalman.hpp>
 #include <cairn/filter/robust.hpp>

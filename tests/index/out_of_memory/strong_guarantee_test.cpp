@@ -15,9 +15,9 @@
 #include <doctest/doctest.h>
 
 #include <cairn/index/best_bin_first.hpp>
-#include <cairn/index/bulk_match.hpp>
-#include <cairn/index/landmark_map.hpp>
+#include <cairn/index/landmark_store.hpp>
 #include <cairn/index/multi_kd_tree.hpp>
+#include <cairn/index/packed_points.hpp>
 #include <cairn/index/tree_file.hpp>
 
 #include "support/random.hpp"

@@ -1,0 +1,158 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The measurement update by one orthogonal triangularisation: what the square-root filters always do, and
+/// the others where a subtraction would leave no digits.
+///
+///   [R^1/2  H L; 0  L] -> [S^1/2 0; K S^1/2  L'],   P = L L^T,   P' = L' L'^T
+/// (P. Kaminski, A. Bryson, S. Schmidt, "Discrete square root filtering", IEEE Trans. Automatic Control 16,
+/// 1971.) Arrays are kept transposed: a row for each source of uncertainty, a column for each number of the
+/// measurement, then one for each of the state. Nothing is subtracted, so that S may be as near to singular
+/// and P' as much below P as the square of the rounding.
+#pragma once
+
+#include <cmath>
+#include <limits>
+
+#include <cairn/core/factor.hpp>
+#include <cairn/core/linalg.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/status.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
+
+/// root root^T, symmetric bit for bit.
+template <int N, class S>
+[[nodiscard]] Matrix<N, N, S> squared_root(const Matrix<N, N, S>& root) {
+  Matrix<N, N, S> a = root;
+  for (int j = 0; j < static_cast<int>(root.rows()); ++j)
+    for (int i = j; i < static_cast<int>(root.rows()); ++i) {
+      S sum(0);
+      for (int k = 0; k < static_cast<int>(root.cols()); ++k) sum += root(i, k) * root(j, k);
+      a(i, j) = a(j, i) = sum;
+    }
+  return a;
+}
+
+/// The parts of a triangularised array.
+template <int N, int M, class S>
+struct ArrayUpdate {
+  Matrix<M, M, S> root_s;  ///< lower triangular, S = root_s root_s^T
+  Matrix<N, N, S> root;    ///< lower triangular, of the updated covariance
+  Matrix<N, M, S> white;   ///< K root_s = P H^T root_s^-T
+  Vector<N, S> step;
+  S nis = S(0);
+  S log_determinant = std::numeric_limits<S>::quiet_NaN();  ///< of S where S itself has lost it, else NaN
+  bool regular = true;                                      ///< S has an inverse
+};
+
+/// Triangularises `array`, which is used up.
+template <int N, int M, class S, class Array>
+[[nodiscard]] ArrayUpdate<N, M, S> update_by_array(Array& array, const Vector<M, S>& residual, int n) {
+  using std::log;
+  using std::sqrt;
+  const int m = static_cast<int>(residual.size());
+  triangularise(array);
+  ArrayUpdate<N, M, S> out{lower_part<Matrix<M, M, S>>(array, 0, m), lower_part<Matrix<N, N, S>>(array, m, n),
+                           Matrix<N, M, S>::Zero(n, m), Vector<N, S>::Zero(n)};
+  Vector<M, S> y = residual;
+  S log_root(0), least_share(1);
+  for (int i = 0; i < m; ++i) {
+    S variance(0);
+    for (int k = 0; k <= i; ++k) variance += out.root_s(i, k) * out.root_s(i, k);
+    for (int k = 0; k < i; ++k) y(i) -= out.root_s(i, k) * y(k);
+    const S head = out.root_s(i, i);
+    out.regular = out.regular && head > root_digits_left<S> * sqrt(variance);
+    if (head * head < least_share * variance) least_share = head * head / variance;
+    y(i) /= head;
+    if (out.regular) log_root += log(head);
+  }
+  if (least_share < digits_left<S>) out.log_determinant = S(2) * log_root;
+  out.nis = y.dot(y);
+  for (int i = 0; i < n; ++i)
+    for (int k = 0; k < m; ++k) {
+      out.white(i, k) = array(k, m + i);
+      out.step(i) += out.white(i, k) * y(k);
+    }
+  return out;
+}
+
+/// In which numbers a prior came, whose last digits are not to be trusted: those of P or those of its root.
+enum class KeptAs { covariance, root };
+
+/// The update is determined by the numbers it came from: were each variance of P (or number of its root) and
+/// of R known to its last digit only, H x, z and x - K H x would still keep three digits of their deviations.
+/// Where differences of nearly equal numbers decide, it is not. `lower` is the prior's root, `digits` what
+/// the columns of the array need to have left. O(n^2 m).
+template <int N, int M, class S>
+[[nodiscard]] bool determined(const ArrayUpdate<N, M, S>& update, const Matrix<N, N, S>& lower,
+                              const Matrix<M, N, S>& h, const Matrix<M, M, S>& r, KeptAs kept,
+                              S digits = root_digits_left<S>) {
+  using std::abs;
+  using std::sqrt;
+  const int n = static_cast<int>(lower.rows()), m = static_cast<int>(h.rows());
+  // Rounding of the deviations `of_state` and `of_noise` against the one that is left.
+  const auto shrinks = [&](const S& of_state, const S& of_noise, const S& left) {
+    const S as_squares = digits_left<S> * (kept == KeptAs::covariance ? of_state * of_state : S(0));
+    return of_state * digits <= left && as_squares + digits_left<S> * of_noise * of_noise <= left * left;
+  };
+  const auto deviation = [n](const Matrix<N, N, S>& root, int i) {
+    S variance(0);
+    for (int k = 0; k < n; ++k) variance += root(i, k) * root(i, k);
+    return static_cast<S>(sqrt(variance));
+  };
+  Vector<N, S> sigma = Vector<N, S>::Zero(n);
+  for (int i = 0; i < n; ++i) sigma(i) = deviation(lower, i);
+  Matrix<M, N, S> white = h;                            // root_s^-1 H
+  Matrix<M, M, S> noise = Matrix<M, M, S>::Zero(m, m);  // root_s^-1, a column for each deviation of R
+  for (int j = 0; j < m; ++j) {
+    S of_state(0), of_noise(0);
+    noise(j, j) = r(j, j) > S(0) ? S(sqrt(r(j, j))) : S(0);
+    for (int k = 0; k < j; ++k) {
+      for (int i = 0; i < n; ++i) white(j, i) -= update.root_s(j, k) * white(k, i);
+      for (int i = 0; i <= k; ++i) noise(j, i) -= update.root_s(j, k) * noise(k, i);
+    }
+    for (int i = 0; i < n; ++i) {
+      white(j, i) /= update.root_s(j, j);
+      of_state += abs(white(j, i)) * sigma(i);
+    }
+    for (int i = 0; i <= j; ++i) {
+      noise(j, i) /= update.root_s(j, j);
+      of_noise += abs(noise(j, i));
+    }
+    if (!shrinks(of_state, of_noise, S(1))) return false;
+  }
+  for (int i = 0; i < n; ++i) {
+    S of_state(0), of_noise(0);
+    for (int j = 0; j < n; ++j) {
+      S entry(i == j ? 1 : 0);  // of I - K H
+      for (int k = 0; k < m; ++k) entry -= update.white(i, k) * white(k, j);
+      of_state += abs(entry) * sigma(j);
+    }
+    for (int j = 0; j < m; ++j) {
+      S entry(0);  // of K
+      for (int k = j; k < m; ++k) entry += update.white(i, k) * noise(k, j);
+      of_noise += abs(entry);
+    }
+    const S least = root_digits_left<S> * sigma(i), left = deviation(update.root, i);
+    if (!shrinks(of_state, of_noise, left > least ? left : least)) return false;
+  }
+  return true;
+}
+
+/// Takes an array's update over into the innovation, and says whether it may be kept.
+template <int N, int M, class S>
+[[nodiscard]] Status judge_array(const ArrayUpdate<N, M, S>& update, Innovation<M, S>& in, double gate) {
+  in.covariance = squared_root<M, S>(update.root_s);
+  in.nis = update.nis;
+  in.log_determinant = update.log_determinant;
+  if (!update.regular || !all_finite(update.root) || !all_finite(update.step)) {
+    in.nis = S(0);
+    return Status::not_positive_definite;
+  }
+  return update.nis <= static_cast<S>(gate) ? Status::accepted : Status::gated;
+}
+
+}}}  // namespace cairn::CAIRN_ABI::detail

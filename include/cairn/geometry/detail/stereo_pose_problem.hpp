@@ -1,0 +1,238 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The problem behind stereo_pose.hpp: poses from three matches, their scores, and reweighted Gauss-Newton
+/// steps on any number of matches. Loops over all matches work on four at a time (stereo_residual.hpp).
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include <cairn/core/check.hpp>
+#include <cairn/core/linalg.hpp>
+#include <cairn/core/statistics.hpp>
+#include <cairn/geometry/alignment.hpp>
+#include <cairn/geometry/detail/pose_equations.hpp>
+#include <cairn/geometry/detail/stereo_residual.hpp>
+#include <cairn/geometry/ransac.hpp>
+#include <cairn/geometry/robust_loss.hpp>
+#include <cairn/geometry/stereo_match.hpp>
+#include <cairn/geometry/stereo_pose_options.hpp>
+#include <cairn/geometry/stereo_rig.hpp>
+#include <cairn/geometry/triangulation.hpp>
+#include <cairn/manifold/se3.hpp>
+#include <cairn/version.hpp>
+
+// Where the compiler may assume AVX2 anyway, one version of the loops is enough.
+#if defined(__x86_64__) && !defined(__AVX2__)
+#define CAIRN_POSE_AVX2
+#endif
+
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
+
+inline void check_start(const SE3& T_world_camera, const Matrix<6>& information) {
+  if (!all_finite(T_world_camera.matrix()) || !all_finite(information))
+    raise("stereo pose: expected a finite pose and information to start from");
+}
+
+/// The problem that ransac() solves for a stereo pose.
+class StereoPoseProblem {
+public:
+  using Model = SE3;
+  static constexpr std::size_t sample_size = 3;
+  static_assert(sample_size <= match_lanes);
+
+  StereoPoseProblem(const StereoRig& rig, std::span<const StereoMatch> matches,
+                    const StereoPoseOptions& options, const std::optional<PosePrior>& prior)
+      : rig_(rig),
+        options_(options),
+        prior_(prior),
+        matches_(matches),
+        triangulator_(rig, {.method = TriangulationMethod::weighted_midpoint, .max_gap = 5}),
+        lanes_((matches.size() + match_lanes - 1) / match_lanes),
+        gate_(chi_square_quantile(options.gate_probability, dof())) {
+    CAIRN_EXPECTS(options.loss_scale > 0, "stereo pose: loss_scale is positive");
+    if (prior) check_start(prior->T_world_camera, prior->information);
+    for (std::size_t i = 0; i < matches.size(); ++i)
+      prepare(matches[i], i, rig, options.right_rows, lanes_[i / match_lanes]);
+  }
+
+  [[nodiscard]] std::size_t size() const noexcept { return matches_.size(); }
+
+  /// Closed form on three triangulated points, then two Gauss-Newton steps on their pixels.
+  [[nodiscard]] bool solve(std::span<const std::uint32_t> sample, SE3& pose) const {
+    Vector<3> source[sample_size], target[sample_size];
+    double weights[sample_size];
+    MatchLanes lanes[1] = {};  // one block holds a sample
+    for (std::size_t k = 0; k < sample_size; ++k) {
+      const StereoMatch& m = matches_[sample[k]];
+      const Triangulation seen = triangulator_(m.left, m.right, m.sigma_left, m.sigma_right);
+      if (!seen.good()) return false;
+      source[k] = seen.point;
+      target[k] = m.landmark;
+      weights[k] = 1 / (seen.point(2) * seen.point(2) * seen.point(2) * seen.point(2));
+      copy_lane(lanes_[sample[k] / match_lanes], sample[k] % match_lanes, lanes[0], k);
+    }
+    if (too_narrow(source) || too_narrow(target)) return false;
+    const Alignment start = align_points(source, target, weights);
+    if (!start.good()) return false;
+    pose = start.T_target_source;
+    constexpr double everything = std::numeric_limits<double>::max();
+    for (int step = 0; step < 2; ++step)
+      if (!newton_step(lanes, pose, everything, RobustLoss::none, 1)) return false;
+    return true;
+  }
+
+  [[nodiscard]] RansacScore score(const SE3& pose, double limit) const noexcept {
+    const StereoView view(pose, rig_);
+#ifdef CAIRN_POSE_AVX2
+    if (__builtin_cpu_supports("avx2")) return score_avx2(view, limit);
+#endif
+    return score_lanes(view, limit);
+  }
+
+  /// Local optimisation: one step that listens to a neighbourhood wider than the gate, one within it.
+  [[nodiscard]] bool refine(SE3& pose) const {
+    return step(pose, 3).has_value() && step(pose, 1).has_value();
+  }
+
+  void inliers(const SE3& pose, std::span<std::uint8_t> mask) const noexcept {
+    const StereoView view(pose, rig_);
+    StereoStatistics s;
+    for (std::size_t i = 0; i < mask.size(); ++i) {
+      if (i % match_lanes == 0) evaluate(lanes_[i / match_lanes], view, gate_, s);
+      mask[i] = s.chi_squared[i % match_lanes] < gate_;
+    }
+  }
+
+  /// One reweighted Gauss-Newton step with all sigmas taken `widening` times as large, on the matches inside
+  /// the gate: its length in standard deviations, squared, or nothing where the equations are degenerate.
+  [[nodiscard]] std::optional<double> step(SE3& pose, double widening = 1) const {
+    return newton_step(lanes_, pose, gate_ * widening * widening, options_.loss,
+                       options_.loss_scale * widening);
+  }
+
+  /// A guess that may be off by tens of pixels, brought closer.
+  [[nodiscard]] SE3 approach(SE3 pose) const {
+    for (const double widening : {40.0, 12.0, 4.0})
+      if (!step(pose, widening)) break;
+    return pose;
+  }
+
+  /// Information of the pose by the matches below the gate and the prior. The first part carries the
+  /// efficiency of the loss and the gate.
+  [[nodiscard]] Matrix<6> information(const SE3& pose) const {
+    PoseEquations equations;
+    linearise(lanes_, pose, gate_, RobustLoss::none, 1, equations);
+    Matrix<6> result =
+        equations.information(pose.rotation().matrix()) *
+        robust_efficiency(options_.loss, options_.loss_scale, options_.gate_probability, gate_, dof());
+    Vector<6> unused = Vector<6>::Zero();
+    add_prior(pose, result, unused);
+    return result;
+  }
+
+private:
+  // Independent coordinates of a residual.
+  [[nodiscard]] int dof() const noexcept { return options_.right_rows ? 4 : 3; }
+
+  [[gnu::always_inline]] RansacScore score_lanes(const StereoView& view, double limit) const noexcept {
+    MatchLane cost = {};  // less what the lanes without a match will add
+    cost[0] = -static_cast<double>(lanes_.size() * match_lanes - matches_.size()) * gate_;
+    decltype(cost < cost) inliers = {};
+    StereoStatistics s;
+    for (std::size_t i = 0; i < lanes_.size(); ++i) {
+      evaluate(lanes_[i], view, gate_, s);
+      const auto inside = s.chi_squared < gate_;
+      inliers -= inside;  // true is -1
+      cost += inside ? s.chi_squared : gate_ + MatchLane{};
+      if (i % 4 == 3 && sum(cost) > limit) break;
+    }
+    return {sum(cost), static_cast<std::size_t>((inliers[0] + inliers[1]) + (inliers[2] + inliers[3]))};
+  }
+
+  [[gnu::always_inline]] void linearise_lanes(std::span<const MatchLanes> matches, const StereoView& view,
+                                              double gate, RobustLoss loss, double loss_scale,
+                                              PoseEquations& equations) const noexcept {
+    StereoStatistics s;
+    for (const MatchLanes& m : matches) {
+      if (!evaluate(m, view, gate, s)) continue;
+      MatchLane weight;
+      for (std::size_t lane = 0; lane < match_lanes; ++lane) {
+        const double chi_squared = s.chi_squared[lane];
+        weight[lane] = chi_squared < gate ? robust_weight(loss, loss_scale, chi_squared) : 0;
+      }
+      equations.add(s, weight);
+    }
+  }
+
+#ifdef CAIRN_POSE_AVX2
+  [[gnu::target("avx2")]] RansacScore score_avx2(const StereoView& view, double limit) const noexcept {
+    return score_lanes(view, limit);
+  }
+  [[gnu::target("avx2")]] void linearise_avx2(std::span<const MatchLanes> matches, const StereoView& view,
+                                              double gate, RobustLoss loss, double loss_scale,
+                                              PoseEquations& equations) const noexcept {
+    linearise_lanes(matches, view, gate, loss, loss_scale, equations);
+  }
+#endif
+
+  void linearise(std::span<const MatchLanes> matches, const SE3& pose, double gate, RobustLoss loss,
+                 double loss_scale, PoseEquations& equations) const noexcept {
+    const StereoView view(pose, rig_);
+#ifdef CAIRN_POSE_AVX2
+    if (__builtin_cpu_supports("avx2"))
+      return linearise_avx2(matches, view, gate, loss, loss_scale, equations);
+#endif
+    linearise_lanes(matches, view, gate, loss, loss_scale, equations);
+  }
+
+  [[nodiscard]] std::optional<double> newton_step(std::span<const MatchLanes> matches, SE3& pose, double gate,
+                                                  RobustLoss loss, double loss_scale) const {
+    PoseEquations equations;
+    linearise(matches, pose, gate, loss, loss_scale, equations);
+    const Matrix<3> R = pose.rotation().matrix();
+    Matrix<6> information = equations.information(R);
+    Vector<6> gradient = equations.gradient(R);
+    add_prior(pose, information, gradient);
+    const auto factor = factor_information(information);
+    if (!factor) return std::nullopt;
+    const Vector<6> d = factor->solve(gradient);
+    pose = retract(pose, d);
+    return d.dot(gradient);
+  }
+
+  void add_prior(const SE3& pose, Matrix<6>& information, Vector<6>& gradient) const {
+    if (!prior_ || prior_->information.isZero(0)) return;
+    const Vector<6> error = local(prior_->T_world_camera, pose);
+    const Matrix<6> J = SE3::right_jacobian_inverse(error);
+    information += symmetrised(transposed_product(J, product(prior_->information, J)));
+    gradient -= transposed_product(J, product(prior_->information, error));
+  }
+
+  // Sine of the smallest angle of the triangle below 0.02, or a side of no length.
+  [[nodiscard]] static bool too_narrow(const Vector<3> (&x)[sample_size]) noexcept {
+    const Vector<3> a = x[1] - x[0], b = x[2] - x[0], c = x[2] - x[1];
+    const double area = cross<double>(a, b).squaredNorm();
+    const double aa = a.squaredNorm(), bb = b.squaredNorm(), cc = c.squaredNorm();
+    return !(area > 4e-4 * std::max({aa * bb, aa * cc, bb * cc}));
+  }
+
+  StereoRig rig_;
+  StereoPoseOptions options_;
+  std::optional<PosePrior> prior_;
+  std::span<const StereoMatch> matches_;
+  Triangulator triangulator_;
+  std::vector<MatchLanes> lanes_;
+  double gate_;
+};
+
+}}}  // namespace cairn::CAIRN_ABI::detail
+
+#undef CAIRN_POSE_AVX2

@@ -1,0 +1,193 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// Sixteen numbers side by side (GNU vector extensions), and code compiled for the widest vectors of the
+/// processor it runs on.
+///
+/// Leaves and wide nodes hold sixteen points or boxes, coordinate by coordinate, so that one pass of vector
+/// code answers for all of them: one AVX-512 register, two of AVX, four of SSE2 or NEON.
+/// with_widest_lanes(body) compiles body three times and picks at run time; everything that body calls must
+/// be inlined. The operations and their order are the same in each, but AVX-512 fuses multiply and add, so
+/// the last bit of a distance may differ between processors (never between runs or thread counts on one).
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <new>
+#include <type_traits>
+#include <vector>
+
+#if defined(__x86_64__)
+#include <emmintrin.h>
+#endif
+
+#include <cairn/simd/shuffle.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
+
+inline constexpr std::size_t block_size = 16;  ///< points in a leaf, children of a wide node
+
+/// Sixteen Ts. Pass by reference only: by value the calling convention depends on the target.
+template <class T>
+struct BlockOf {
+  using Type __attribute__((vector_size(block_size * sizeof(T)))) = T;
+};
+template <class T>
+using Block = typename BlockOf<T>::Type;
+
+/// The integer as wide as T: nonnegative floating point numbers compare like their bits.
+template <class T>
+using BitsOf = std::conditional_t<sizeof(T) == 4, std::int32_t, std::int64_t>;
+
+/// Type of coordinate differences and distances: float for float and small integers, else double.
+template <class Scalar>
+using RealOf =
+    std::conditional_t<std::is_same_v<Scalar, float> || (std::is_integral_v<Scalar> && sizeof(Scalar) <= 2),
+                       float, double>;
+
+/// Reads sixteen numbers, converting to the type computed in.
+template <class Real, class Scalar>
+[[gnu::always_inline]] inline void load_block(const Scalar* from, Block<Real>& to) noexcept {
+  if constexpr (std::is_same_v<Real, Scalar>) {
+    std::memcpy(&to, from, sizeof(to));
+  } else {
+    Block<Scalar> raw;
+    std::memcpy(&raw, from, sizeof(raw));
+    if constexpr (sizeof(Scalar) == 1 &&
+                  sizeof(Real) == 4)  // in two steps, which compilers know how to widen
+      to = __builtin_convertvector(__builtin_convertvector(raw, Block<std::int32_t>), Block<Real>);
+    else
+      to = __builtin_convertvector(raw, Block<Real>);
+  }
+}
+
+/// Bit i is set where number i is below the limit.
+template <class Real>
+[[gnu::always_inline]] inline unsigned mask_below(const Block<Real>& numbers, Real limit) noexcept {
+#if defined(__x86_64__)
+  if constexpr (sizeof(Real) == 4) {
+    const auto below = numbers < limit;
+    __m128i quarter[4];
+    std::memcpy(quarter, &below, sizeof(below));
+    const __m128i low = _mm_packs_epi32(quarter[0], quarter[1]);
+    const __m128i high = _mm_packs_epi32(quarter[2], quarter[3]);
+    return static_cast<unsigned>(_mm_movemask_epi8(_mm_packs_epi16(low, high)));
+  }
+#endif
+  unsigned mask = 0;
+  for (std::size_t i = 0; i < block_size; ++i) mask |= static_cast<unsigned>(numbers[i] < limit) << i;
+  return mask;
+}
+
+/// Smallest of sixteen integers.
+template <class Int>
+[[gnu::always_inline]] inline Int smallest(const Block<Int>& numbers) noexcept {
+  using Eight __attribute__((vector_size(8 * sizeof(Int)))) = Int;
+  using Four __attribute__((vector_size(4 * sizeof(Int)))) = Int;
+  Eight eights[2];
+  std::memcpy(eights, &numbers, sizeof(numbers));
+  const Eight eight = eights[0] < eights[1] ? eights[0] : eights[1];
+  Four fours[2];
+  std::memcpy(fours, &eight, sizeof(eight));
+  Four four = fours[0] < fours[1] ? fours[0] : fours[1];
+  Four swapped;
+  shuffle<2, 3, 0, 1>(four, four, swapped);
+  four = four < swapped ? four : swapped;
+  Four crossed;
+  shuffle<1, 0, 3, 2>(four, four, crossed);
+  four = four < crossed ? four : crossed;
+  return four[0];
+}
+
+/// Adds one axis to sixteen sums: at once where the metric is written for any number type, else one by one.
+template <class Real, class M>
+[[gnu::always_inline]] inline void accumulate_block(const M& metric, Block<Real>& sums,
+                                                    const Block<Real>& difference,
+                                                    std::size_t axis) noexcept {
+  if constexpr (requires { metric.accumulate(sums, difference, axis); }) {
+    metric.accumulate(sums, difference, axis);
+  } else {
+    for (std::size_t i = 0; i < block_size; ++i) {
+      Real sum = sums[i];
+      const Real one = difference[i];
+      metric.accumulate(sum, one, axis);
+      sums[i] = sum;
+    }
+  }
+}
+
+#if defined(__x86_64__)
+enum class LaneWidth { narrow, avx2, avx512 };
+
+/// Tests set it to compare the paths; not synchronised.
+inline LaneWidth& lane_width() noexcept {
+  static LaneWidth width = [] {
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
+        __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq"))
+      return LaneWidth::avx512;
+    return __builtin_cpu_supports("avx2") ? LaneWidth::avx2 : LaneWidth::narrow;
+  }();
+  return width;
+}
+
+template <class Body>
+[[gnu::target("avx512f,avx512bw,avx512vl,avx512dq,avx2"), gnu::noinline]] void with_avx512(Body& body) {
+  body();
+}
+template <class Body>
+[[gnu::target("avx2"), gnu::noinline]] void with_avx2(Body& body) {
+  body();
+}
+
+/// Runs body() compiled for the widest vectors at hand. Mark the lambda CAIRN_INLINED.
+template <class Body>
+inline void with_widest_lanes(Body body) {
+  switch (lane_width()) {
+    case LaneWidth::avx512:
+      return with_avx512(body);
+    case LaneWidth::avx2:
+      return with_avx2(body);
+    case LaneWidth::narrow:
+      return body();
+  }
+}
+#else
+template <class Body>
+inline void with_widest_lanes(Body body) {
+  body();
+}
+#endif
+
+/// Memory on cache lines.
+template <class T>
+struct CacheLineAllocator {
+  using value_type = T;
+  CacheLineAllocator() = default;
+  template <class U>
+  explicit(false) CacheLineAllocator(const CacheLineAllocator<U>&) noexcept {}
+  [[nodiscard]] T* allocate(std::size_t count) {
+    return static_cast<T*>(::operator new(count * sizeof(T), std::align_val_t{64}));
+  }
+  void deallocate(T* memory, std::size_t) noexcept { ::operator delete(memory, std::align_val_t{64}); }
+  /// Numbers are left unset by resize(): whoever asks for them writes them.
+  template <class U>
+  void construct(U* at) noexcept {
+    ::new (static_cast<void*>(at)) U;
+  }
+  template <class U, class... Args>
+  void construct(U* at, Args&&... args) {
+    ::new (static_cast<void*>(at)) U(static_cast<Args&&>(args)...);
+  }
+  bool operator==(const CacheLineAllocator&) const = default;
+};
+template <class T>
+using AlignedVector = std::vector<T, CacheLineAllocator<T>>;
+
+}}}  // namespace cairn::CAIRN_ABI::detail
+
+/// Attribute of a lambda given to with_widest_lanes().
+#define CAIRN_INLINED __attribute__((always_inline))

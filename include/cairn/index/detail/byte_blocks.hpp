@@ -1,0 +1,302 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// Points of one byte a coordinate, sixteen to a block, and their squared distances in whole numbers.
+///
+/// A block holds four coordinates of the first point, the same four of the second, and so on, then the next
+/// four: each lane of 32 bits belongs to one point. Where the processor multiplies and adds bytes (AVX-512
+/// VNNI), |p - q|^2 = |p|^2 + |q|^2 - 2 p.q takes one instruction for four coordinates of sixteen points;
+/// elsewhere differences are squared in 16 bits. Whole numbers: every path gives the same bits.
+#pragma once
+
+#include <algorithm>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <vector>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+#include <cairn/core/sizes.hpp>
+#include <cairn/index/detail/block_lanes.hpp>
+
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
+
+/// Most coordinates whose squared distances fit 32 bits, on all ways to them.
+inline constexpr std::size_t most_byte_axes = 16384;
+
+/// What one lane of a block holds.
+inline constexpr std::size_t lane_axes = 4;
+
+/// A point that distances are taken from.
+class ByteQuery {
+public:
+  ByteQuery() = default;
+
+  void set(const std::uint8_t* codes, std::size_t dim) {
+    const std::size_t padded = (dim + lane_axes - 1) / lane_axes * lane_axes;
+    codes_.assign(padded, 0);
+    shifted_.assign(padded, 0);
+    square_ = 0;
+    for (std::size_t a = 0; a < dim; ++a) {
+      codes_[a] = codes[a];
+      shifted_[a] = static_cast<std::int8_t>(codes[a] - 128);
+      square_ += codes[a] * codes[a];
+    }
+  }
+
+  [[nodiscard]] const std::uint8_t* codes() const noexcept { return codes_.data(); }
+  /// Less 128: the signed operand of byte products.
+  [[nodiscard]] const std::int8_t* shifted() const noexcept { return shifted_.data(); }
+  [[nodiscard]] std::int32_t square() const noexcept { return square_; }
+
+private:
+  std::vector<std::uint8_t> codes_;
+  std::vector<std::int8_t> shifted_;
+  std::int32_t square_ = 0;
+};
+
+/// Blocks in memory, for the kernels: `groups` lines of 64 bytes each, and |p|^2 - 256 (sum of p) a point.
+struct ByteBlockRange {
+  const std::uint8_t* codes;
+  const std::int32_t* constants;
+  std::size_t groups;
+  std::size_t count;
+};
+
+#if defined(__x86_64__)
+/// Four coordinates of the query in every lane.
+[[nodiscard, gnu::always_inline]] inline std::int32_t lane_of(const void* coordinates,
+                                                              std::size_t group) noexcept {
+  std::int32_t four = 0;
+  std::memcpy(&four, static_cast<const char*>(coordinates) + group * lane_axes, sizeof(four));
+  return four;
+}
+
+[[gnu::target("avx512f,avx512bw,avx512vl,avx512vnni")]] inline void byte_distances_vnni(
+    const ByteBlockRange& blocks, const ByteQuery& query, std::int32_t* distances) noexcept {
+  const std::uint8_t* line = blocks.codes;
+  const __m512i square = _mm512_set1_epi32(query.square());
+  for (std::size_t block = 0; block < blocks.count; ++block) {
+    __m512i product = _mm512_setzero_si512();  // two sums, to hide the latency of one
+    __m512i other = _mm512_setzero_si512();
+    std::size_t group = 0;
+    for (; group + 1 < blocks.groups; group += 2, line += 128) {
+      product = _mm512_dpbusd_epi32(product, _mm512_loadu_si512(line),
+                                    _mm512_set1_epi32(lane_of(query.shifted(), group)));
+      other = _mm512_dpbusd_epi32(other, _mm512_loadu_si512(line + 64),
+                                  _mm512_set1_epi32(lane_of(query.shifted(), group + 1)));
+    }
+    if (group < blocks.groups) {
+      product = _mm512_dpbusd_epi32(product, _mm512_loadu_si512(line),
+                                    _mm512_set1_epi32(lane_of(query.shifted(), group)));
+      line += 64;
+    }
+    product = _mm512_add_epi32(product, other);
+    const __m512i constant = _mm512_loadu_si512(blocks.constants + block * block_size);
+    _mm512_storeu_si512(distances + block * block_size, _mm512_sub_epi32(_mm512_add_epi32(constant, square),
+                                                                         _mm512_add_epi32(product, product)));
+  }
+}
+
+/// Squared differences of eight points' four coordinates from the query's.
+[[nodiscard, gnu::target("avx2"), gnu::always_inline]] inline __m256i byte_squares_avx2(
+    const std::uint8_t* line, const __m256i& even_from, const __m256i& odd_from) noexcept {
+  const __m256i codes = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(line));
+  const __m256i even = _mm256_sub_epi16(_mm256_and_si256(codes, _mm256_set1_epi16(255)), even_from);
+  const __m256i odd = _mm256_sub_epi16(_mm256_srli_epi16(codes, 8), odd_from);
+  return _mm256_add_epi32(_mm256_madd_epi16(even, even), _mm256_madd_epi16(odd, odd));
+}
+
+[[gnu::target("avx2")]] inline void byte_distances_avx2(const ByteBlockRange& blocks, const ByteQuery& query,
+                                                        std::int32_t* distances) noexcept {
+  const std::uint8_t* line = blocks.codes;
+  for (std::size_t block = 0; block < blocks.count; ++block) {
+    __m256i low = _mm256_setzero_si256(), high = _mm256_setzero_si256();
+    for (std::size_t group = 0; group < blocks.groups; ++group, line += 64) {
+      const __m256i from = _mm256_set1_epi32(lane_of(query.codes(), group));
+      const __m256i even_from = _mm256_and_si256(from, _mm256_set1_epi16(255));
+      const __m256i odd_from = _mm256_srli_epi16(from, 8);
+      low = _mm256_add_epi32(low, byte_squares_avx2(line, even_from, odd_from));
+      high = _mm256_add_epi32(high, byte_squares_avx2(line + 32, even_from, odd_from));
+    }
+    std::int32_t* to = distances + block * block_size;
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), low);
+    _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + 8), high);
+  }
+}
+
+/// Whether the processor multiplies and adds bytes.
+[[nodiscard]] inline bool has_byte_products() noexcept {
+  static const bool answer = __builtin_cpu_supports("avx512vnni");
+  return answer;
+}
+#endif
+
+inline void byte_distances_plain(const ByteBlockRange& blocks, const ByteQuery& query,
+                                 std::int32_t* distances) noexcept {
+  using SixteenBits __attribute__((vector_size(64))) = std::uint16_t;
+  using Lanes = Block<std::uint32_t>;
+  const std::uint8_t* line = blocks.codes;
+  for (std::size_t block = 0; block < blocks.count; ++block) {
+    Lanes sums{};
+    for (std::size_t group = 0; group < blocks.groups; ++group, line += 64) {
+      const std::uint8_t* from = query.codes() + group * lane_axes;
+      Lanes lanes;
+      std::memcpy(&lanes, line, sizeof(lanes));
+      const Lanes even_from = Lanes{} + (from[0] | std::uint32_t{from[2]} << 16);
+      const Lanes odd_from = Lanes{} + (from[1] | std::uint32_t{from[3]} << 16);
+      // No difference of bytes exceeds 255: its square fits 16 bits, whatever the sign that was lost.
+      const SixteenBits even = SixteenBits(lanes & 0x00ff00ffU) - SixteenBits(even_from);
+      const SixteenBits odd = SixteenBits((lanes >> 8) & 0x00ff00ffU) - SixteenBits(odd_from);
+      const Lanes even_squares = Lanes(even * even);
+      const Lanes odd_squares = Lanes(odd * odd);
+      sums += (even_squares & 0xffffU) + (even_squares >> 16) + (odd_squares & 0xffffU) + (odd_squares >> 16);
+    }
+    std::memcpy(distances + block * block_size, &sums, sizeof(sums));
+  }
+}
+
+class ByteBlocks {
+public:
+  ByteBlocks() = default;
+
+  /// Room for some blocks, not yet written.
+  ByteBlocks(std::size_t dim, std::size_t blocks)
+      : dim_(dim),
+        codes_(room_for(blocks, groups() * 64, "DescriptorIndex")),
+        constants_(room_for(blocks, block_size, "DescriptorIndex")) {}
+
+  /// Of `count` points, at least one, row_of(i) being the bytes of point i; the last block repeats the last.
+  template <class RowOf>
+  [[nodiscard]] static ByteBlocks of_rows(std::size_t dim, std::size_t count, const RowOf& row_of) {
+    ByteBlocks result(dim, count / block_size + (count % block_size != 0));
+    for (std::size_t place = 0; place < result.blocks() * block_size; ++place)
+      result.set(place, row_of(std::min(place, count - 1)));
+    return result;
+  }
+
+  [[nodiscard]] std::size_t blocks() const noexcept { return constants_.size() / block_size; }
+  [[nodiscard]] std::size_t bytes() const noexcept {
+    return codes_.capacity() + constants_.capacity() * sizeof(std::int32_t);
+  }
+
+  /// Writes point `place` (block place / 16, lane place % 16): dim bytes.
+  void set(std::size_t place, const std::uint8_t* point) noexcept {
+    std::uint8_t* lane = codes_.data() + place / block_size * groups() * 64 + place % block_size * lane_axes;
+    std::int32_t square = 0, sum = 0;
+    for (std::size_t a = 0; a < groups() * lane_axes; ++a) {
+      const std::uint8_t code = a < dim_ ? point[a] : std::uint8_t{0};
+      lane[a / lane_axes * 64 + a % lane_axes] = code;
+      square += code * code;
+      sum += code;
+    }
+    constants_[place] = square - 256 * sum;
+  }
+
+  /// Squared distances of the points of blocks first ... first + count - 1.
+  void distances(std::size_t first, std::size_t count, const ByteQuery& query,
+                 std::int32_t* distances) const noexcept {
+    const ByteBlockRange range{codes_.data() + first * groups() * 64, constants_.data() + first * block_size,
+                               groups(), count};
+#if defined(__x86_64__)
+    if (lane_width() == LaneWidth::avx512 && has_byte_products())
+      return byte_distances_vnni(range, query, distances);
+    if (lane_width() != LaneWidth::narrow) return byte_distances_avx2(range, query, distances);
+#endif
+    byte_distances_plain(range, query, distances);
+  }
+
+  /// Asks for some blocks ahead of their use; the processor follows by itself from a few kilobytes on.
+  void prefetch(std::size_t first, std::size_t count) const noexcept {
+    const std::uint8_t* line = codes_.data() + first * groups() * 64;
+    const std::size_t lines = std::min<std::size_t>(count * groups(), 64);
+    for (std::size_t i = 0; i < lines; ++i) __builtin_prefetch(line + 64 * i);
+  }
+
+private:
+  [[nodiscard]] std::size_t groups() const noexcept { return (dim_ + lane_axes - 1) / lane_axes; }
+
+  std::size_t dim_ = 0;
+  AlignedVector<std::uint8_t> codes_;
+  AlignedVector<std::int32_t> constants_;
+};
+
+/// Whole numbers in ascending order, one at a time, as many as are asked for; equal ones by their place.
+class SmallestFirst {
+public:
+  static constexpr std::size_t none = static_cast<std::size_t>(-1);
+  static constexpr std::int32_t taken = std::numeric_limits<std::int32_t>::max();
+
+  /// Room for `count` numbers, all below `taken`, to be written to keys() before reset(). Up to a multiple of
+  /// sixteen more may be written, and are forgotten.
+  void resize(std::size_t count) {
+    const std::size_t blocks = (count + block_size - 1) / block_size;
+    keys_.resize(blocks * block_size);
+    minima_.assign((blocks + block_size - 1) / block_size * block_size, taken);
+    count_ = count;
+  }
+  [[nodiscard]] std::int32_t* keys() noexcept { return keys_.data(); }
+
+  void reset() noexcept {
+    for (std::size_t i = count_; i < keys_.size(); ++i) keys_[i] = taken;
+    with_widest_lanes([&]() CAIRN_INLINED {
+      for (std::size_t b = 0; b < keys_.size() / block_size; ++b) minima_[b] = smallest_of(keys_, b);
+    });
+  }
+
+  struct Item {
+    std::size_t place;
+    std::int32_t key;
+  };
+  /// The next; place is none where all were given. O(count / 256).
+  [[nodiscard]] Item next() noexcept {
+    Item item{none, taken};
+    with_widest_lanes([&]() CAIRN_INLINED {
+      const std::size_t groups = minima_.size() / block_size;
+      Block<std::int32_t> low = Block<std::int32_t>{} + taken;
+      for (std::size_t g = 0; g < groups; ++g) {
+        Block<std::int32_t> here;
+        load_block<std::int32_t>(minima_.data() + g * block_size, here);
+        low = here < low ? here : low;
+      }
+      item.key = smallest<std::int32_t>(low);
+      if (item.key == taken) return;
+      const std::size_t block = place_of(minima_, item.key, 0);
+      item.place = place_of(keys_, item.key, block);
+      keys_[item.place] = taken;
+      minima_[block] = smallest_of(keys_, block);
+    });
+    return item;
+  }
+
+private:
+  using Numbers = AlignedVector<std::int32_t>;
+
+  [[gnu::always_inline]] static std::int32_t smallest_of(const Numbers& numbers, std::size_t block) noexcept {
+    Block<std::int32_t> here;
+    load_block<std::int32_t>(numbers.data() + block * block_size, here);
+    return smallest<std::int32_t>(here);
+  }
+  /// First place from a block on that holds a number that is there.
+  [[gnu::always_inline]] static std::size_t place_of(const Numbers& numbers, std::int32_t number,
+                                                     std::size_t block) noexcept {
+    for (;; ++block) {
+      Block<std::int32_t> here;
+      load_block<std::int32_t>(numbers.data() + block * block_size, here);
+      if (const unsigned mask = mask_below<std::int32_t>(here, number + 1))
+        return block * block_size + static_cast<std::size_t>(std::countr_zero(mask));
+    }
+  }
+
+  std::size_t count_ = 0;
+  Numbers keys_;
+  Numbers minima_;
+};
+
+}}}  // namespace cairn::CAIRN_ABI::detail

@@ -1,0 +1,65 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// Four numbers side by side, by the compiler's vector extensions: SSE2 on every x86-64, NEON on AArch64,
+/// plain instructions elsewhere. The same operations in the same order everywhere, so nothing depends on
+/// -march (but for fused multiply-add, if that allows it) or on the level of optimisation.
+///
+/// Eight lanes chosen at run time pay in one place, box_hessian.hpp, where they are left to the compiler's
+/// vectoriser: GCC splits longer vectors of an inlined function before it sees that the caller is for AVX2.
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+#include <cairn/simd/shuffle.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
+
+using Unsigned4 __attribute__((vector_size(16))) = std::uint32_t;
+using Signed4 __attribute__((vector_size(16))) = std::int32_t;
+using Float4 __attribute__((vector_size(16))) = float;
+using Long2 __attribute__((vector_size(16))) = std::uint64_t;
+
+/// Four numbers from anywhere; no alignment is asked for.
+template <class Vector, class Number>
+[[nodiscard, gnu::always_inline]] inline Vector load4(const Number* from) noexcept {
+  static_assert(sizeof(Number) == 4 && sizeof(Vector) == 16);
+  Vector vector;
+  std::memcpy(&vector, from, sizeof vector);
+  return vector;
+}
+
+template <class Vector, class Number>
+[[gnu::always_inline]] inline void store4(const Vector& vector, Number* to) noexcept {
+  static_assert(sizeof(Number) == 4 && sizeof(Vector) == 16);
+  std::memcpy(to, &vector, sizeof vector);
+}
+
+/// from[0], from[1], also_from[0], also_from[1].
+template <class Number>
+[[nodiscard, gnu::always_inline]] inline auto load_pairs(const Number* from,
+                                                         const Number* also_from) noexcept {
+  using Vector __attribute__((vector_size(16))) = Number;
+  static_assert(sizeof(Number) == 4);
+  std::uint64_t first, second;
+  std::memcpy(&first, from, sizeof first);
+  std::memcpy(&second, also_from, sizeof second);
+  return reinterpret_cast<Vector>(Long2{first, second});
+}
+
+/// Lanes of a and b written one after the other, by their numbers.
+template <int First, int Second, int Third, int Fourth>
+[[nodiscard, gnu::always_inline]] inline Float4 lanes_of(const Float4& a, const Float4& b) noexcept {
+  Float4 lanes;
+  shuffle<First, Second, Third, Fourth>(a, b, lanes);
+  return lanes;
+}
+
+[[nodiscard, gnu::always_inline]] inline Float4 to_float(Unsigned4 two_complement) noexcept {
+  return __builtin_convertvector(reinterpret_cast<Signed4>(two_complement), Float4);
+}
+
+}}}  // namespace cairn::CAIRN_ABI::detail
