@@ -29,6 +29,7 @@ enum class [[nodiscard]] Status {
   depleted,               ///< no particle, or no weight, or no mode is left
   not_converged,          ///< an iteration stopped before its tolerance
   too_old,                ///< the measurement is of a moment before all that is remembered
+  unknown_block,          ///< a block that is named is not in the state, or is named twice
 };
 
 /// The status as a sentence for a log.
@@ -54,6 +55,8 @@ enum class [[nodiscard]] Status {
       return "refused: the iteration did not converge";
     case Status::too_old:
       return "refused: the measurement is older than what is remembered";
+    case Status::unknown_block:
+      return "refused: a block that is named is not in the state, or is named twice";
   }
   return "unknown status";
 }
