@@ -159,9 +159,10 @@ private:
 ///   New initialise(const Known& x, const Measurement& z) const;     // Product<Known...> where they are
 ///   several
 /// One Gauss-Newton step of the new block follows, which matters where z has more numbers than it. With H =
-/// [H_k H_n] and N = H_n^T R^-1 H_n: jacobian -N^-1 H_n^T R^-1 H_k, noise N^-1, which is the limit of an
-/// update with a new block of infinite variance. Where the sensor does not determine the block the noise is
-/// NaN, and refused.
+/// [H_k H_n] and N = H_n^T R^-1 H_n: jacobian -N^-1 H_n^T R^-1 H_k, noise N^-1. That is an update with a new
+/// block of infinite variance, but for what z says beyond the block, which is dropped: nothing, where the
+/// sensor sees the block relative to the known ones. Where z does not determine the block the noise is NaN,
+/// and refused.
 template <LinearisedMeasurement H>
 struct Inverted;
 template <LinearisedMeasurement H>
@@ -225,57 +226,114 @@ template <int M, class S>
   return is_valid_covariance<M, S>(r) ? Status::accepted : Status::not_positive_definite;
 }
 
-/// Gauss-Newton on the posterior of the named blocks alone, P being theirs: the mode of all blocks is that of
-/// the named ones and what the others expect given those. The step is P y, so that P may be singular;
-/// extended.hpp says the rest. Leaves in `at` the last linearisation, seen from the prior.
-template <class H, class S, int N>
-[[nodiscard]] Status iterate(const H& sensor, const typename H::Measurement& z,
-                             const typename H::State& prior, const Matrix<N, N, S>& p, int iterations,
-                             double tolerance, LinearisedAt<H>& at, Vector<N, S>& y) {
-  using State = typename H::State;
-  constexpr int m = dof<typename H::Measurement>;
-  const auto cost_at = [&](const Vector<N, S>& dual, const Vector<N, S>& step, S& cost) {
-    LinearisedAt<H> there;
-    if (!there.fill(sensor, retract(prior, step), z)) return false;
-    cost = dual.dot(step) + squared_mahalanobis<m, S>(there.residual, there.noise);
+/// A sensor seen from the prior: its answers at prior (+) step, the jacobian by the step from the prior.
+/// False where sizes do not fit. Of run-time size, so that what iterates is compiled once.
+template <class S>
+struct SensorFromPrior {
+  Vector<dynamic, S> residual;
+  Matrix<dynamic, dynamic, S> jacobian, noise;
+  const void* context = nullptr;  // of the function
+  bool (*linearise)(SensorFromPrior& at, const Vector<dynamic, S>& step, bool with_jacobian) = nullptr;
+};
+
+/// Gauss-Newton on the posterior of the named blocks alone, p being their covariance: the mode of all blocks
+/// is that of the named ones and what the others expect given those. The step is p y, so that p may be
+/// singular; extended.hpp says the rest. Leaves in `at` the last linearisation.
+template <class S>
+[[nodiscard]] Status iterate(SensorFromPrior<S>& at, const Matrix<dynamic, dynamic, S>& p, int iterations,
+                             double tolerance, Vector<dynamic, S>& y) {
+  using Column = Vector<dynamic, S>;
+  const int n = static_cast<int>(p.rows());
+  const auto times = [n](const Matrix<dynamic, dynamic, S>& a, const Column& x) {
+    Column result = Column::Zero(a.rows());
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < static_cast<int>(a.rows()); ++i) result(i) += a(i, j) * x(j);
+    return result;
+  };
+  const auto dot = [n](const Column& a, const Column& b) {
+    S sum(0);
+    for (int i = 0; i < n; ++i) sum += a(i) * b(i);
+    return sum;
+  };
+  const auto cost_at = [&](const Column& dual, const Column& step, S& cost) {
+    if (!at.linearise(at, step, false)) return false;
+    cost = dot(dual, step) + squared_mahalanobis<dynamic, S>(at.residual, at.noise);
     return true;
   };
-  y.setZero();
-  Vector<N, S> e = Vector<N, S>::Zero();
+  y = Column::Zero(n);
+  Column e = Column::Zero(n);
   S cost(0);
+  SensorFromPrior<S> last = at;
   if (!cost_at(y, e, cost)) return Status::size_mismatch;
   for (int k = 0; k < iterations; ++k) {
-    if (!at.fill(sensor, retract(prior, e), z)) return Status::size_mismatch;
-    if (const Status status = check_noise<m, S>(at.noise); status != Status::accepted) return status;
-    if constexpr (!is_vector<State>) {
-      const auto moved =
-          numeric_jacobian([&](const Vector<N, S>& d) -> State { return retract(prior, d); }, e);
-      at.jacobian = product(Matrix<m, N, S>(at.jacobian), Matrix<N, N, S>(moved));
-    }
-    at.residual += product(at.jacobian, e);
+    if (!at.linearise(at, e, true)) return Status::size_mismatch;
+    const int m = static_cast<int>(at.residual.size());
+    if (const Status status = check_noise<dynamic, S>(at.noise); status != Status::accepted) return status;
+    at.residual += times(at.jacobian, e);
     if (!all_finite(at.residual) || !all_finite(at.jacobian)) return Status::not_finite;
-    const Matrix<N, m, S> ph = product_transposed(p, at.jacobian);
-    const Cholesky<m, S> root(symmetrised(Matrix<m, m, S>(product(at.jacobian, ph) + at.noise)));
+    last = at;
+    Matrix<dynamic, dynamic, S> covariance = at.noise, hp(m, n);
+    for (int j = 0; j < n; ++j)
+      for (int i = 0; i < m; ++i) {
+        S sum(0);
+        for (int l = 0; l < n; ++l) sum += at.jacobian(i, l) * p(l, j);
+        hp(i, j) = sum;
+      }
+    for (int j = 0; j < m; ++j)
+      for (int i = 0; i < m; ++i)
+        for (int l = 0; l < n; ++l) covariance(i, j) += hp(i, l) * at.jacobian(j, l);
+    const Cholesky<dynamic, S> root(symmetrised(covariance));
     if (!root.good()) return Status::not_positive_definite;
-    Vector<N, S> change = transposed_product(at.jacobian, root.solve(at.residual));
-    change -= y;
-    Vector<N, S> next = y + change;
-    Vector<N, S> step = product(p, next);
+    const Column weighted = root.solve(at.residual);
+    Column change(n);
+    for (int j = 0; j < n; ++j) {
+      change(j) = -y(j);
+      for (int i = 0; i < m; ++i) change(j) += at.jacobian(i, j) * weighted(i);
+    }
     S lower(0);
-    if (!cost_at(next, step, lower)) return Status::size_mismatch;
-    for (int halving = 0; halving < 10 && !(lower <= cost); ++halving) {
-      change *= S(0.5);
+    Column next, step;
+    for (int halving = 0; halving <= 10; ++halving) {
       next = y + change;
-      step = product(p, next);
+      step = times(p, next);
       if (!cost_at(next, step, lower)) return Status::size_mismatch;
+      if (lower <= cost) break;
+      change *= S(0.5);
     }
     if (!(lower <= cost)) break;  // no descent left above rounding
     y = next;
     e = step;
     cost = lower;
-    if (change.dot(product(p, change)) <= static_cast<S>(tolerance * tolerance)) break;
+    if (dot(change, times(p, change)) <= static_cast<S>(tolerance * tolerance)) break;
   }
+  at = last;
   return all_finite(e) ? Status::accepted : Status::not_finite;
+}
+
+/// A jacobian by steps from x (+) e, block by block made one by steps from x.
+template <class... X, class S, class State>
+void carry_columns(Matrix<dynamic, dynamic, S>& jacobian, const State& x, const Tangent<State>& e) {
+  const auto carry = [&]<class B>(const B& block, int first) {
+    if constexpr (!is_vector<B>) {
+      constexpr int d = dof<B>;
+      Tangent<B> step;
+      for (int k = 0; k < d; ++k) step(k) = e(first + k);
+      const CovarianceOf<B> by = carried(block, step);
+      for (int i = 0; i < static_cast<int>(jacobian.rows()); ++i) {
+        S row[d];
+        for (int k = 0; k < d; ++k) row[k] = jacobian(i, first + k);
+        for (int k = 0; k < d; ++k) {
+          jacobian(i, first + k) = S(0);
+          for (int l = 0; l < d; ++l) jacobian(i, first + k) += row[l] * by(l, k);
+        }
+      }
+    }
+  };
+  if constexpr (sizeof...(X) == 1)
+    carry(x, 0);
+  else
+    [&]<std::size_t... I>(std::index_sequence<I...>) {
+      (carry(x.template part<I>(), block_offsets<X...>[I]), ...);
+    }(std::index_sequence_for<X...>{});
 }
 
 }  // namespace detail
@@ -470,18 +528,38 @@ Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> JointExten
     }
   }
   // The same with the last linearisation of the named blocks' own iteration.
-  Vector<n, S> dual;
+  struct Context {
+    const H& sensor;
+    const typename H::Measurement& z;
+    const State& prior;
+  } context{sensor, z, x};
+  detail::SensorFromPrior<S> mode;
+  mode.context = &context;
+  mode.linearise = [](detail::SensorFromPrior<S>& from, const Vector<dynamic, S>& step, bool with_jacobian) {
+    const Context& given = *static_cast<const Context*>(from.context);
+    Tangent<State> e;
+    for (int i = 0; i < n; ++i) e(i) = step(i);
+    detail::LinearisedAt<H> there;
+    if (!there.fill(given.sensor, retract(given.prior, e), given.z)) return false;
+    from.residual = there.residual;
+    from.noise = there.noise;
+    if (!with_jacobian) return true;
+    from.jacobian = there.jacobian;
+    detail::carry_columns<X...>(from.jacobian, given.prior, e);
+    return true;
+  };
+  Vector<dynamic, S> dual;
   const std::array<detail::RowRange, sizeof...(X)> ranges{belief.range(*belief.find(ids))...};
-  Matrix<n, n, S> p;
+  Matrix<dynamic, dynamic, S> p(n, n);
   core.read(ranges, ranges, p.data());
-  in.status = detail::iterate<H, S, n>(sensor, z, x, p, iterations, tolerance, at, dual);
+  in.status = detail::iterate<S>(mode, p, iterations, tolerance, dual);
   if (!in.accepted()) return in;
-  Matrix<m, m, S> covariance = at.noise;
-  const auto last = belief.template parts<m, X...>(at.jacobian, ids...);
+  Matrix<dynamic, dynamic, S> covariance = mode.noise;
+  const auto last = belief.template parts<dynamic, X...>(mode.jacobian, ids...);
   core.measure(last, rows, covariance.data());
-  covariance += at.noise;
-  const Cholesky<m, S> root(covariance);
-  if (!root.good() || !lowers<m, S>(core, last, root, at.noise)) {
+  covariance += mode.noise;
+  const Cholesky<dynamic, S> root(covariance);
+  if (!root.good() || !lowers<dynamic, S>(core, last, root, mode.noise)) {
     in.status = Status::not_positive_definite;
     return in;
   }

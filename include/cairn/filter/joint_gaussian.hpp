@@ -121,6 +121,12 @@ struct StateOfBlocks<X> {
   static const X& of(const X& x) { return x; }
 };
 
+/// How steps move from the tangent space at x to that at x (+) d.
+template <Manifold X>
+[[nodiscard]] CovarianceOf<X> carried(const X& x, const Tangent<X>& d) {
+  return numeric_jacobian([&](const Tangent<X>& e) -> X { return retract(x, e); }, d);
+}
+
 /// A model of State may speak of blocks X...: they are its state, or the parts of it in order.
 template <class State, class... X>
 concept SpeaksOf = std::same_as<State, typename StateOfBlocks<X...>::type>;
@@ -563,9 +569,7 @@ private:
             moves = moves || d(k) != Scalar(0);
           }
           if (!moves) continue;
-          const X& old = kind.values[i];
-          const CovarianceOf<X> by =
-              numeric_jacobian([&](const Tangent<X>& e) -> X { return retract(old, e); }, d);
+          const CovarianceOf<X> by = detail::carried(kind.values[i], d);
           core_.rows().template turn<cairn::dof<X>>(row, by.data());
         }
     };
