@@ -317,6 +317,7 @@ public:
   Status marginalise(AnyBlockId id) {
     const Slot* const slot = find(id);
     if (slot == nullptr) return Status::unknown_block;
+    make_room_to_drop();
     core_.release(range(*slot));
     delist(id);
     if (core_.sparse()) close_gaps();
@@ -326,6 +327,7 @@ public:
   Status marginalise(std::span<const AnyBlockId> ids) {
     if (!distinct(ids)) return Status::unknown_block;
     const std::vector<AnyBlockId> gone(ids.begin(), ids.end());  // `ids` may be blocks()
+    make_room_to_drop();
     for (const AnyBlockId id : gone) {
       core_.release(range(*find(id)));
       delist(id);
@@ -489,11 +491,15 @@ private:
     return {part(ids)...};
   }
 
-  /// For one more block of kind X, so that enlist() and delist() cannot fail.
+  /// What a copy has no room for.
+  void make_room_to_drop() {
+    detail::room_for(free_slots_, slots_.size());
+    core_.make_room(core_.size());
+  }
+  /// For one more block of kind X, so that enlist() cannot fail.
   template <class X>
   void make_room() {
     detail::room_for(slots_, slots_.size() + 1);
-    detail::room_for(free_slots_, slots_.size() + 1);
     detail::room_for(order_, order_.size() + 1);
     detail::room_for(means<X>().values, means<X>().values.size() + 1);
     detail::room_for(means<X>().slots, means<X>().slots.size() + 1);
