@@ -685,6 +685,15 @@ TEST_SUITE("joint_gaussian") {
     CHECK(filter.predict(belief, cairn::Unicycle{}, u, 1.0, BlockId<SE2>{}) == Status::unknown_block);
     CHECK(filter.predict(belief, cairn::Unicycle{}, u, 1.0, BlockId<SE2>{landmark}) == Status::unknown_block);
 
+    struct Convoy {
+      using State = Product<SE2, SE2>;
+      using Control = NoControl;
+      [[nodiscard]] State propagate(const State& x, const Control&, double) const { return x; }
+      [[nodiscard]] cairn::Identity<6> jacobian(const State&, const Control&, double) const { return {}; }
+      [[nodiscard]] cairn::Identity<6> noise(const State&, const Control&, double) const { return {}; }
+    };
+    CHECK(filter.predict(belief, Convoy{}, 1.0, robot, robot) == Status::unknown_block);
+
     const auto status = [&](const auto& options, const auto& sensor, const auto& seen) {
       const auto said = options.innovation(belief, sensor, seen, robot, landmark).status;
       const auto done = options.update(belief, sensor, seen, robot, landmark).status;
@@ -836,6 +845,40 @@ TEST_SUITE("joint_gaussian") {
     // A landmark that hangs on it can be no better than the rounding of what it was; it is refused, not
     // negative.
     CHECK(cairn::detail::is_valid_covariance<d, double>(belief.covariance()));
+  }
+
+  TEST_CASE("joint_gaussian: stays a covariance over thousands of steps of a window of clones") {
+    cairn::Random random(cairn_test::seed());
+    for (const Form form : {Form::standard, Form::joseph}) {
+      Scene scene(12);
+      Slam& belief = scene.belief;
+      const JointExtended filter{.form = form};
+      std::vector<BlockId<SE2>> window;
+      for (int step = 0; step < 2000; ++step) {
+        REQUIRE(
+            filter.predict(belief,
+                           cairn::Unicycle{.speed_density = 1e-4, .slip_density = 1e-8, .turn_density = 1e-5},
+                           Vector<2>(1, 0.3 * random.normal()), 0.02, scene.robot) == Status::accepted);
+        if (step % 5 == 0) {
+          window.push_back(belief.clone(scene.robot).id);
+          if (window.size() > 6) {
+            REQUIRE(belief.marginalise(window.front()) == Status::accepted);
+            window.erase(window.begin());
+          }
+        }
+        const auto then = window[random.below(window.size())];
+        const cairn_test::Passage passage{1e-6 * Matrix<3>::Identity()};
+        const auto way =
+            passage.predict(cairn_test::Passage::State(belief.mean(then), belief.mean(scene.robot)));
+        REQUIRE(filter.update(belief, passage, way, then, scene.robot).accepted());
+        const int i = static_cast<int>(random.below(12));
+        REQUIRE(filter
+                    .update(belief, Sighting{}, scene.seen(i), scene.robot,
+                            scene.landmarks[static_cast<std::size_t>(i)])
+                    .accepted());
+        if (step % 100 == 0) REQUIRE(cairn::detail::is_valid_covariance<d, double>(belief.covariance()));
+      }
+    }
   }
 
   TEST_CASE("joint_gaussian: single precision, poses in space, and blocks that are products") {

@@ -5,18 +5,24 @@
 /// The extended Kalman filter on a state that grows (joint_gaussian.hpp): steps that name the blocks they are
 /// about.
 ///
-///   struct LandmarkSighting {                                 // any sensor of model.hpp whose State is the
-///     using State = Product<SE2, Vector<2>>;                  // Product of the blocks that will be named,
-///     using Measurement = Product<Vector<1>, SO2>;            // or the one block
-///     Measurement predict(const State& x) const;              // x.part<0>(): the pose, x.part<1>(): the
-///     landmark Matrix<2, 5> jacobian(const State& x) const;            // columns: pose, then landmark;
-///     numeric() and Matrix<2> noise(const State& x) const;                  // automatic() of linearise.hpp
-///     give it as well Vector<2> initialise(const SE2& pose, const Measurement& z) const;  // for inverted()
-///   };
-///   const JointExtended filter{.gate = chi_square_quantile(0.999, 2)};
-///   filter.predict(belief, Unicycle{}, control, dt, robot);                // this block moves, no other
-///   filter.innovation(belief, LandmarkSighting{}, z, robot, landmark).nis  // for data association: O(d^2)
-///   filter.update(belief, LandmarkSighting{}, z, robot, landmark);         // all blocks learn
+/// Any sensor of model.hpp will do whose State is the Product of the blocks that will be named, or the one
+/// block; numeric() and automatic() of linearise.hpp give its Jacobian as well:
+/// ```cpp
+/// struct LandmarkSighting {
+///   using State = cairn::Product<cairn::SE2, cairn::Vector<2>>;  // x.part<0>(): pose, x.part<1>(): landmark
+///   using Measurement = cairn::Product<cairn::Vector<1>, cairn::SO2>;
+///   Measurement predict(const State& x) const;
+///   cairn::Matrix<2, 5> jacobian(const State& x) const;  // columns of the pose, then of the landmark
+///   cairn::Matrix<2> noise(const State& x) const;
+///   cairn::Vector<2> initialise(const cairn::SE2& pose, const Measurement& z) const;  // for inverted()
+/// };
+/// ```
+/// ```cpp
+/// const cairn::JointExtended filter{.gate = cairn::chi_square_quantile(0.999, 2)};
+/// const auto moved = filter.predict(belief, cairn::Unicycle{}, control, dt, robot);     // the others stay
+/// const double distance = filter.innovation(belief, sighting, z, robot, landmark).nis;  // to associate by
+/// const auto seen = filter.update(belief, sighting, z, robot, landmark);                // all blocks learn
+/// ```
 ///
 /// With H zero but for the d columns of the named blocks, n numbers of all steps and m of the measurement:
 ///   W = P H^T S^-T/2: O(n d m);   P <- P - W W^T: one pass over the lower triangle, n^2 m / 2

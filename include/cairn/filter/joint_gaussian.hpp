@@ -5,19 +5,25 @@
 /// A belief that grows: one Gaussian over a list of blocks (poses, landmarks, biases) that come and go at run
 /// time, with all their correlations.
 ///
-///   cairn::JointGaussian<SE2, Vector<2>> belief;                       // its blocks are poses or landmarks
-///   const auto robot = belief.add(SE2(), Matrix<3>::Zero()).id;
-///   const cairn::JointExtended filter{.gate = 13.8};                   // joint_extended.hpp
-///   std::map<int, cairn::BlockId<Vector<2>>> landmarks;                // EKF-SLAM, associations known:
-///   for (const Entry& entry : log) {
-///     if (filter.predict(belief, Unicycle{}, entry.control, dt, robot) != Status::accepted) return 1;
-///     for (const auto& [name, z] : entry.sightings)
-///       if (const auto known = landmarks.find(name); known != landmarks.end())
-///         seen += filter.update(belief, LandmarkSighting{}, z, robot, known->second).accepted();
-///       else
-///         landmarks[name] = belief.augment(inverted(LandmarkSighting{}), z, robot).id;
+/// EKF-SLAM, associations known:
+/// ```cpp
+/// cairn::JointGaussian<cairn::SE2, cairn::Vector<2>> belief;  // its blocks are poses and landmarks
+/// const auto robot = belief.add(cairn::SE2(), cairn::Matrix<3>::Zero()).id;
+/// const cairn::JointExtended filter{.gate = cairn::chi_square_quantile(0.999, 2)};  // joint_extended.hpp
+/// std::map<int, cairn::BlockId<cairn::Vector<2>>> landmarks;
+/// for (const Entry& entry : log) {
+///   const auto moved = filter.predict(belief, cairn::Unicycle{}, entry.control, dt, robot);
+///   if (moved != cairn::Status::accepted) return 1;
+///   for (const auto& [name, z] : entry.sightings) {
+///     if (const auto known = landmarks.find(name); known != landmarks.end())
+///       used += filter.update(belief, sighting, z, robot, known->second).accepted() ? 1 : 0;
+///     else
+///       landmarks[name] = belief.augment(cairn::inverted(sighting), z, robot).id;
 ///   }
-///   belief.mean(robot);  belief.covariance(landmarks[3]);  belief.cross_covariance(robot, landmarks[3]);
+/// }
+/// const cairn::SE2 pose = belief.mean(robot);
+/// const cairn::Matrix<3, 2> both = belief.cross_covariance(robot, landmarks[3]);
+/// ```
 ///
 /// Stochastic cloning: `const auto then = belief.clone(robot).id;` keeps the pose of this moment, fully
 /// correlated; a sensor of the motion since then names both; `belief.marginalise(then)` forgets it. A window
@@ -87,16 +93,16 @@ struct [[nodiscard]] AddedBlock {
 };
 
 /// How a new block follows from known ones and a measurement:
-///
-///   struct Place {
-///     using State = SE2;              // of the block it is seen from; Product<...> for several
-///     using Measurement = Product<Vector<1>, SO2>;
-///     using New = Vector<2>;
-///     New initialise(const State& x, const Measurement& z) const;             // without noise
-///     Matrix<2, 3> jacobian(const State& x, const Measurement& z) const;      // step of New by step of x
-///     Matrix<2> noise(const State& x, const Measurement& z) const;            // covariance of New if x is
-///     known
-///   };
+/// ```cpp
+/// struct Place {
+///   using State = cairn::SE2;  // of the block it is seen from; Product<...> for several
+///   using Measurement = cairn::Product<cairn::Vector<1>, cairn::SO2>;
+///   using New = cairn::Vector<2>;
+///   New initialise(const State& x, const Measurement& z) const;                // without noise
+///   cairn::Matrix<2, 3> jacobian(const State& x, const Measurement& z) const;  // step of New by step of x
+///   cairn::Matrix<2> noise(const State& x, const Measurement& z) const;        // of New if x were known
+/// };
+/// ```
 /// inverted() of joint_extended.hpp makes one of a sensor.
 template <class G>
 concept InverseModel =
