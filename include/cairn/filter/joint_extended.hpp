@@ -436,7 +436,7 @@ Status JointExtended::predict(JointGaussian<Kinds...>& belief, const F& process,
       if (named[i] == named[k]) return Status::unknown_block;
   if (!(belief.has(ids) && ...)) return Status::unknown_block;
 
-  const State& x = Named::of(belief.mean(ids)...);
+  const State x = Named::of(belief.mean(ids)...);
   State moved = x;
   Matrix<n, n, S> f, q;
   if (!detail::to_state(process.propagate(x, control, dt), moved) ||
@@ -502,7 +502,7 @@ Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> JointExten
     in.status = Status::unknown_block;
     return in;
   }
-  const State& x = detail::StateOfBlocks<X...>::of(belief.mean(ids)...);
+  const State x = detail::StateOfBlocks<X...>::of(belief.mean(ids)...);
   detail::LinearisedAt<H> at;
   if (!at.fill(sensor, x, z)) {
     in.status = Status::size_mismatch;

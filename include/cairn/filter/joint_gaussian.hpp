@@ -124,7 +124,7 @@ struct StateOfBlocks {
 template <Manifold X>
 struct StateOfBlocks<X> {
   using type = X;
-  static const X& of(const X& x) { return x; }
+  static X of(const X& x) { return x; }
 };
 
 /// How steps move from the tangent space at x to that at x (+) d.
@@ -289,7 +289,7 @@ public:
     constexpr int d = cairn::dof<New>;
     constexpr int known = cairn::dof<typename G::State>;
     if (!(has(ids) && ...)) return {{}, Status::unknown_block};
-    const typename G::State& x = Named::of(mean(ids)...);
+    const typename G::State x = Named::of(mean(ids)...);
     Matrix<d, known, Scalar> g;
     Matrix<d, d, Scalar> q;
     New value = model.initialise(x, z);
