@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "growing.hpp"
 #include "rivals.hpp"
 #include "support/scoreboard.hpp"
 #include "support/timing.hpp"
@@ -120,5 +121,6 @@ int main(int argc, char** argv) {
   }
   absolute(board, "UD 6/3", factored.factored_6_3, steps, 1.0, {}, {});
   absolute(board, "UD 15/6", factored.factored_15_6, steps, 1.0, {}, {});
+  add_growing_rows(board);
   return board.finish();
 }

@@ -32,6 +32,7 @@ enum class [[nodiscard]] Status {
   too_old,                ///< the measurement is of a moment before all that is remembered
   bad_weights,            ///< weights or probabilities are negative, or do not sum to 1
   contradiction,          ///< constraints disagree with each other, or with what is known exactly
+  unknown_block,          ///< a block that is named is not in the state, or is named twice
 };
 
 /// The status as a sentence for a log.
@@ -61,6 +62,8 @@ enum class [[nodiscard]] Status {
       return "refused: probabilities are negative or do not sum to 1";
     case Status::contradiction:
       return "refused: constraints contradict each other or what is known exactly";
+    case Status::unknown_block:
+      return "refused: a block that is named is not in the state, or is named twice";
   }
   return "unknown status";
 }
