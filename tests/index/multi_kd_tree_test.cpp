@@ -492,7 +492,7 @@ TEST_SUITE("multi_kd_tree") {
       reference.erase(9);
       const std::string once = "an id can be given only once";
       for (const auto& bad : std::vector<std::vector<cairn::PointId>>{
-               {20, 21, 5}, {22, 9}, {30, 31, 30}, {3}, {40, 41, 42, 40}, {1000, 3}})
+               {20, 21, 5}, {22, 9}, {30, 31, 30}, {3}, {40, 41, 42, 40}, {1000, 3}, {4, 4}, {7, 5}})
         CHECK(insert(bad).find(once) != std::string::npos);
       CHECK(insert({50, cairn::no_point}).find("no_point is not an id") != std::string::npos);
       CHECK(violation_of([&] {
@@ -503,11 +503,11 @@ TEST_SUITE("multi_kd_tree") {
         CHECK_FALSE(index.contains(id));
       check_answers(index, reference, random);
       // The numbers are free, the next insertion goes on after the largest that was taken.
-      CHECK(insert({20, 21, 22, 30}).empty());
+      CHECK(insert({20, 21, 22, 30, 4, 7}).empty());
       const auto more = random_points(3, random);
       CHECK(index.insert(more) == 31);
       for (cairn::PointId i = 0; i < 3; ++i) reference[31 + i] = more[i];
-      CHECK(index.size() == 9);
+      CHECK(index.size() == 11);
       check_answers(index, reference, random);
     }
   }
