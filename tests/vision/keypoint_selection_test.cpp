@@ -121,7 +121,8 @@ TEST_SUITE("keypoint_selection") {
     std::vector<cairn::Keypoint> strongest = scattered(500, seed);
     cairn::keep_strongest(strongest, 60);
     const int most = std::numeric_limits<int>::max();
-    for (const auto& [columns, rows] : {std::pair{61, 1}, {8, 8}, {65536, 65536}, {most, most}, {most, 2}}) {
+    for (const auto& grid : {std::pair{61, 1}, {8, 8}, {65536, 65536}, {most, most}, {most, 2}}) {
+      const int columns = grid.first, rows = grid.second;
       CAPTURE(columns);
       std::vector<cairn::Keypoint> kept = scattered(500, seed);
       cairn::keep_strongest_spread(kept, 60, 100, 80, columns, rows);
