@@ -63,6 +63,24 @@ TEST_SUITE("ensemble") {
     }
   }
 
+  TEST_CASE(
+      "ensemble: draws of the perturbed form do not move the mean, which is the Kalman update's exactly") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const EnsembleKalman filter{.form = EnsembleForm::perturbed};
+    const LinearProblem<4, 1> p(random);
+    auto belief = Ensemble<Vector<4>>::draw(p.prior, 7, random);
+    for (int step = 0; step < 10; ++step) {
+      REQUIRE(filter.predict(belief, p.process, {}, 1.0, random) == Status::accepted);
+      auto exact = belief.gaussian();
+      const Vector<1> z(random.normal());
+      REQUIRE(Kalman{}.update(exact, p.sensor, z).accepted());
+      REQUIRE(filter.update(belief, p.sensor, z, random).accepted());
+      CHECK(relative_error(belief.gaussian().mean, exact.mean) < 1e-11);
+    }
+  }
+
   TEST_CASE("ensemble: many members tend to the Kalman filter in both forms") {
     const auto seed = cairn_test::seed();
     CAPTURE(seed);

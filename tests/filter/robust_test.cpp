@@ -83,6 +83,35 @@ TEST_SUITE("robust") {
     }
   }
 
+  TEST_CASE("student: of two numbers at once it ends where their posterior is level") {
+    const cairn::LinearSensor<2, 1> both{Matrix<2, 1>(1.0, 0.5), Vector<2>(0.25, 1.0).asDiagonal()};
+    const StudentT<Kalman> filter{.degrees = 3.0};
+    for (const double z : {1.2, 2.5, -1.5}) {
+      CAPTURE(z);
+      auto belief = prior;
+      REQUIRE(filter.update(belief, both, Vector<2>(z, 0.3)).accepted());
+      // Student's density of m numbers goes with the power -(degrees + m) / 2.
+      const auto cost = [&](double x) {
+        const double squared = (z - x) * (z - x) / 0.25 + (0.3 - 0.5 * x) * (0.3 - 0.5 * x);
+        return 0.5 * (x - 1.0) * (x - 1.0) / 0.5 + 2.5 * std::log(1.0 + squared / 3.0);
+      };
+      const double x = belief.mean(0), h = 1e-4;
+      CHECK(std::abs(cost(x + h) - cost(x - h)) / (2 * h) < 1e-6);
+      CHECK(cost(x + 0.01) > cost(x));
+      CHECK(cost(x - 0.01) > cost(x));
+    }
+  }
+
+  TEST_CASE("adapted_noise: the old noise and what was seen, in their shares") {
+    const cairn::LinearSensor<1, 2> slope{Matrix<1, 2>(2.0, -1.0), Matrix<1>(1.0)};
+    Matrix<2> p;
+    p << 0.5, 0.1, 0.1, 0.3;
+    const Gaussian<Vector<2>> belief{Vector<2>(1.0, 3.0), p};
+    // z is 4 from h(x) = -1, and H P H^T = 4 * 0.5 - 4 * 0.1 + 0.3.
+    const auto r = cairn::adapted_noise(Matrix<1>(1.5), belief, slope, Vector<1>(3.0), 0.25);
+    CHECK(r(0, 0) == doctest::Approx(0.75 * 1.5 + 0.25 * (16 + 1.9)).epsilon(1e-14));
+  }
+
   // A tenth of the errors ten times as large: the robust filters lose little, the plain one much.
   TEST_CASE("huber and student: track through outliers better than the plain filter") {
     const auto seed = cairn_test::seed();

@@ -136,6 +136,26 @@ TEST_SUITE("timeline") {
     CHECK(same(timeline.belief(), before));
   }
 
+  TEST_CASE(
+      "timeline: what is older than the horizon is refused, though nothing came since, and several go at "
+      "once") {
+    const std::vector<Happening> story{{1, 0.1, Vector<2>(0.4, 0)},    {2, 0.2, Vector<2>(0.5, -0.1)},
+                                       {0, 0.3, Vector<2>(0.8, -0.3)}, {2, 0.35, Vector<2>(0.3, 0.3)},
+                                       {1, 5.0, Vector<2>(0.2, 0)},    {2, 5.5, Vector<2>(4.0, 1.0)}};
+    Run timeline(Extended{}, Unicycle{}, prior, 0.0, start, 1.0);
+    for (const Happening& h : story) REQUIRE(tell(timeline, h) == Status::accepted);
+    CHECK(timeline.size() == 2);
+    CHECK(same(timeline.belief(), in_order(Extended{}, story, 5.5)));
+    CHECK(same(timeline.at(4.6).value(), in_order(Extended{}, story, 4.6)));
+    for (const double late : {0.36, 2.0, 4.49}) {
+      CAPTURE(late);
+      CHECK(tell(timeline, {1, late, Vector<2>(0, 0)}) == Status::too_old);
+      CHECK(tell(timeline, {0, late, Vector<2>(0, 0)}) == Status::too_old);
+      CHECK_FALSE(timeline.at(late).has_value());
+    }
+    CHECK(tell(timeline, {1, 4.51, Vector<2>(0, 0)}) == Status::accepted);
+  }
+
   TEST_CASE("timeline: refuses bad numbers and stays as it was") {
     Run timeline(Extended{}, Unicycle{}, prior, 0.0, start, 10.0);
     const double nan = std::nan("");

@@ -87,6 +87,28 @@ TEST_SUITE("alignment") {
     }
   }
 
+  TEST_CASE("align_points: the variance is what is left over the numbers beyond those that were fitted") {
+    cairn::Random random(cairn_test::seed());
+    for (const std::size_t count : {4U, 5U, 9U}) {
+      const Points source = random_points(random, count), target = random_points(random, count);
+      std::vector<double> weights(count);
+      for (double& weight : weights) weight = random.uniform(0.5, 2.0);
+      for (const bool with_scale : {false, true}) {
+        const Alignment a = align_points(source, target, weights, {.with_scale = with_scale});
+        double left = 0, sum = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+          const Vector<3> apart = target[i] - a.T_target_source * Vector<3>(a.scale * source[i]);
+          left += weights[i] * apart.dot(apart);
+          sum += weights[i];
+        }
+        const double fitted = with_scale ? 7 : 6;
+        CHECK(a.variance ==
+              doctest::Approx(left / (3.0 * static_cast<double>(count) - fitted)).epsilon(1e-12));
+        CHECK(a.rms == doctest::Approx(std::sqrt(left / sum)).epsilon(1e-12));
+      }
+    }
+  }
+
   TEST_CASE("align_points: weights count like repeated points, weight zero like none") {
     cairn::Random random(cairn_test::seed());
     Points source = random_points(random, 5), target = random_points(random, 5);

@@ -49,6 +49,18 @@ TEST_SUITE("collectors") {
     CHECK(scaled.second() == 4);
   }
 
+  TEST_CASE("collectors: of points equally far those of lower number come first") {
+    std::vector<std::array<float, 2>> ring;
+    for (int i = 0; i < 200; ++i) ring.push_back({i % 4 < 2 ? 3.0F : -3.0F, i % 2 == 0 ? 4.0F : -4.0F});
+    for (int i = 0; i < 3; ++i) ring.push_back({1, 0});
+    const auto found = cairn::KdTree<float, 2>(ring).within(std::array{0.0F, 0.0F}, 6.0F);
+    REQUIRE(found.size() == ring.size());
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      CHECK(found[i].id == (i < 3 ? 200 + i : i - 3));
+      CHECK(found[i].distance == (i < 3 ? 1 : 5));
+    }
+  }
+
   TEST_CASE("collectors: a point that is not there is infinitely far, by angles too") {
     const float infinity = std::numeric_limits<float>::infinity();
     cairn::NearestTwo<float, cairn::Angular> none;

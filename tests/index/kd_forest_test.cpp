@@ -23,6 +23,13 @@ namespace {
 using cairn::Rows;
 using Forest = cairn::KdForest<>;
 
+/// Wants whatever is looked at.
+struct Everything {
+  std::set<cairn::PointId> ids;
+  [[nodiscard]] float limit() const { return std::numeric_limits<float>::infinity(); }
+  void offer(cairn::PointId id, float) { ids.insert(id); }
+};
+
 }  // namespace
 
 TEST_SUITE("kd_forest") {
@@ -88,6 +95,27 @@ TEST_SUITE("kd_forest") {
     const auto* first = forest.trees()[1].blocks().ids(0);
     const auto* second = forest.trees()[2].blocks().ids(0);
     CHECK(!std::equal(first, first + 16, second));
+  }
+
+  TEST_CASE("kd_forest: with a leaf a tree, what is looked at is each tree's own leaf of the query") {
+    cairn::Random random(cairn_test::seed(73));
+    const auto numbers = cairn_test::make_points<float>("uniform", 3000, 20, random);
+    const Forest forest(Rows<float>(numbers, 20), {.trees = 4, .turned_axes = 20});
+    cairn::BestBinFirst<Forest> search;
+    int same = 0;
+    for (cairn::PointId id = 0; id < 3000; id += 30) {
+      std::set<cairn::PointId> expected;
+      for (const auto& tree : forest.trees())
+        for (std::size_t leaf = 0; leaf < tree.blocks().leaves(); ++leaf) {
+          const std::set<cairn::PointId> ids(tree.blocks().ids(leaf), tree.blocks().ids(leaf) + 16);
+          if (ids.count(id) != 0) expected.insert(ids.begin(), ids.end());
+        }
+      expected.erase(cairn::no_point);
+      Everything all;
+      search.search(forest, Rows<float>(numbers, 20)[id], all, {.leaves = 4});
+      same += all.ids == expected ? 1 : 0;
+    }
+    CHECK(same > 90);  // a point that a leaf was split at stands on the other side of that split
   }
 
   TEST_CASE("kd_forest: nothing in it, and bad input") {

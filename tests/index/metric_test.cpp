@@ -65,6 +65,18 @@ TEST_SUITE("metric") {
     CHECK(cairn::detail::largest_reduced(cairn::Angular{}, 4.0F) == infinity);  // all directions
   }
 
+  TEST_CASE("metric: distances of one pair, by what each metric is named after") {
+    const std::vector<std::array<double, 3>> points{{1, -2, 0.5}};
+    const std::array query{3.0, 1.0, -5.5};  // apart by 2, 3 and 6
+    const auto distance = [&]<class M>(const M& metric) {
+      return cairn::KdTree<double, 3, M>(points, metric).nearest(query)->distance;
+    };
+    CHECK(distance(cairn::L2{}) == doctest::Approx(7).epsilon(1e-15));
+    CHECK(distance(cairn::L1{}) == 11);
+    CHECK(distance(cairn::LInfinity{}) == 6);
+    CHECK(distance(cairn::WeightedL2<3>{{0.5, 2.0, 0.0}}) == doctest::Approx(std::sqrt(37.0)).epsilon(1e-15));
+  }
+
   TEST_CASE("metric: a point is within the distance that is reported for it, in every kind of search") {
     const std::uint64_t seed = cairn_test::seed(205);
     CAPTURE(seed);

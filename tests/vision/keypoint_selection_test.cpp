@@ -55,6 +55,18 @@ TEST_SUITE("keypoint_selection") {
     CHECK_FALSE(cairn::stronger(small, small));
   }
 
+  TEST_CASE("stronger: responses are told per scale") {
+    cairn::Keypoint small, large;
+    small.response = 10;
+    large.response = 30;
+    small.scale = 1;
+    large.scale = 4;
+    CHECK(cairn::stronger(small, large));
+    CHECK_FALSE(cairn::stronger(large, small));
+    large.response = 50;
+    CHECK(cairn::stronger(large, small));
+  }
+
   TEST_CASE("keep_strongest_spread: gives every cell its share, and the whole number in the end") {
     const std::uint64_t seed = cairn_test::seed();
     CAPTURE(seed);
@@ -77,13 +89,40 @@ TEST_SUITE("keypoint_selection") {
       }
   }
 
+  TEST_CASE(
+      "keep_strongest_spread: what a cell has is its strongest, and what is left over the strongest of all") {
+    const std::uint64_t seed = cairn_test::seed();
+    CAPTURE(seed);
+    const auto cell = [](const cairn::Keypoint& keypoint) {
+      return static_cast<int>((keypoint.x + 0.5F) / 25) + (keypoint.y < 39.5F ? 0 : 4);
+    };
+    const std::vector<cairn::Keypoint> all = scattered(2000, seed);
+    // Taken are those that fewer than 50 of their own cell beat, then the best of the others.
+    std::vector<cairn::Keypoint> expected, others;
+    for (const cairn::Keypoint& keypoint : all) {
+      const auto better = std::count_if(all.begin(), all.end(), [&](const cairn::Keypoint& other) {
+        return cell(other) == cell(keypoint) && cairn::stronger(other, keypoint);
+      });
+      (better < 50 ? expected : others).push_back(keypoint);
+    }
+    std::sort(others.begin(), others.end(), cairn::stronger);
+    REQUIRE(expected.size() < 400);
+    expected.insert(expected.end(), others.begin(),
+                    others.begin() + static_cast<std::ptrdiff_t>(400 - expected.size()));
+    std::sort(expected.begin(), expected.end(), cairn::stronger);
+    std::vector<cairn::Keypoint> kept = all;
+    cairn::keep_strongest_spread(kept, 400, 100, 80, 4, 2);
+    CHECK(kept == expected);
+  }
+
   TEST_CASE("keep_strongest_spread: of more cells than are kept none has a share, however many there are") {
     const std::uint64_t seed = cairn_test::seed();
     CAPTURE(seed);
     std::vector<cairn::Keypoint> strongest = scattered(500, seed);
     cairn::keep_strongest(strongest, 60);
     const int most = std::numeric_limits<int>::max();
-    for (const auto& [columns, rows] : {std::pair{61, 1}, {8, 8}, {65536, 65536}, {most, most}, {most, 2}}) {
+    for (const auto& grid : {std::pair{61, 1}, {8, 8}, {65536, 65536}, {most, most}, {most, 2}}) {
+      const int columns = grid.first, rows = grid.second;
       CAPTURE(columns);
       std::vector<cairn::Keypoint> kept = scattered(500, seed);
       cairn::keep_strongest_spread(kept, 60, 100, 80, columns, rows);
