@@ -39,6 +39,8 @@
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/information.hpp>
 #include <cairn/filter/interacting.hpp>
+#include <cairn/filter/joint_extended.hpp>
+#include <cairn/filter/joint_gaussian.hpp>
 #include <cairn/filter/kalman.hpp>
 #include <cairn/filter/kalman_bucy.hpp>
 #include <cairn/filter/matrix_of.hpp>

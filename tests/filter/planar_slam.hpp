@@ -8,7 +8,7 @@
 #include <cmath>
 
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/linearise.hpp>
+#include <cairn/filter/differentiate.hpp>
 #include <cairn/manifold/product.hpp>
 #include <cairn/manifold/se2.hpp>
 #include <cairn/manifold/so2.hpp>

@@ -9,9 +9,9 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/sigma_points.hpp>
 #include <cairn/filter/square_root.hpp>
 #include <cairn/filter/unscented.hpp>
+#include <cairn/filter/unscented_transform.hpp>
 
 namespace sigma_points_test {
 namespace {

@@ -6,7 +6,7 @@
 /// about.
 ///
 /// Any sensor of model.hpp will do whose State is the Product of the blocks that will be named, or the one
-/// block; numeric() and automatic() of linearise.hpp give its Jacobian as well:
+/// block; numeric() and automatic() of differentiate.hpp give its Jacobian as well:
 /// ```cpp
 /// struct LandmarkSighting {
 ///   using State = cairn::Product<cairn::SE2, cairn::Vector<2>>;  // x.part<0>(): pose, x.part<1>(): landmark
@@ -42,19 +42,19 @@
 
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/correct.hpp>
 #include <cairn/filter/detail/joint_covariance.hpp>
 #include <cairn/filter/detail/plain_matrix.hpp>
+#include <cairn/filter/detail/update.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/joint_gaussian.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/status.hpp>
-#include <cairn/manifold/jacobian.hpp>
+#include <cairn/manifold/derivatives.hpp>
 #include <cairn/manifold/manifold.hpp>
 #include <cairn/manifold/product.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Several measurements of one moment, linearised one by one, to be taken in at once: one pass over the
 /// covariance in place of one each. Kept in units of their noise. Also the way to a measurement of blocks
@@ -672,4 +672,4 @@ Status StackedMeasurement<S>::add(const JointGaussian<Kinds...>& belief, const V
   return Status::accepted;
 }
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -65,12 +65,12 @@
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/status.hpp>
-#include <cairn/manifold/jacobian.hpp>
+#include <cairn/manifold/derivatives.hpp>
 #include <cairn/manifold/manifold.hpp>
 #include <cairn/manifold/product.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI {
+namespace cairn { inline namespace CAIRN_ABI {
 
 /// Names a block of any kind. It stays good while other blocks come and go, and in copies of the belief; once
 /// its block is gone, and before it is given one, it is refused.
@@ -620,4 +620,4 @@ private:
   int dof_ = 0;
 };
 
-}  // namespace cairn::inline CAIRN_ABI
+}}  // namespace cairn::CAIRN_ABI

@@ -21,7 +21,7 @@
 #include <cairn/filter/detail/symmetric_rows.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI::detail {
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
 /// Consecutive rows.
 struct RowRange {
@@ -682,4 +682,4 @@ private:
     *added_ = nullptr, *corner_ = nullptr;
 };
 
-}  // namespace cairn::inline CAIRN_ABI::detail
+}}}  // namespace cairn::CAIRN_ABI::detail

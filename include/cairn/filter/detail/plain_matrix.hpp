@@ -9,11 +9,11 @@
 
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/gaussian.hpp>
-#include <cairn/filter/structure.hpp>
+#include <cairn/filter/structured.hpp>
 #include <cairn/manifold/manifold.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI::detail {
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
 template <class A, class S, int R, int C>
 concept MayBePlain = std::is_same_v<typename A::Scalar, S> &&
@@ -58,4 +58,4 @@ template <Manifold X, class A>
   return true;
 }
 
-}  // namespace cairn::inline CAIRN_ABI::detail
+}}}  // namespace cairn::CAIRN_ABI::detail

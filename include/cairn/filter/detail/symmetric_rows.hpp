@@ -16,10 +16,10 @@
 #include <type_traits>
 #include <vector>
 
-#include <cairn/filter/column.hpp>
+#include <cairn/filter/detail/register_column.hpp>
 #include <cairn/version.hpp>
 
-namespace cairn::inline CAIRN_ABI::detail {
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
 /// Numbers of one cache line.
 template <class S>
@@ -243,4 +243,4 @@ private:
   int size_ = 0;
 };
 
-}  // namespace cairn::inline CAIRN_ABI::detail
+}}}  // namespace cairn::CAIRN_ABI::detail
