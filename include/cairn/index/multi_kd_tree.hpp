@@ -19,8 +19,7 @@
 /// map.erase(first);                                          // found by nothing from here on
 /// cairn::BestBinFirst<cairn::MultiKdTree<float, 3>> search;  // under a budget; keep one for many searches
 /// search.search(map, query, collector, {.leaves = 24});
-/// for (const cairn::PointId id : cairn::inside(map, low, high)) use(id);  // and NearestFirst order(map,
-/// query)
+/// for (const cairn::PointId id : cairn::inside(map, low, high)) use(id);  // and NearestFirst(map, query)
 /// ```
 ///
 /// Const methods may run at the same time, on any threads, also while a merge is under way in the background;
