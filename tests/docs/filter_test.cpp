@@ -4,6 +4,7 @@
 // The examples in the headers of cairn/filter and in docs/filters.md, compiled and, but for the models that
 // say what a filter asks for, run: see CMakeLists.txt.
 #include <iostream>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -12,6 +13,8 @@
 #include <cairn/core/statistics.hpp>
 #include <cairn/filter/differentiate.hpp>
 #include <cairn/filter/extended.hpp>
+#include <cairn/filter/joint_extended.hpp>
+#include <cairn/filter/joint_gaussian.hpp>
 #include <cairn/filter/kalman.hpp>
 #include <cairn/filter/kalman_bucy.hpp>
 #include <cairn/filter/model.hpp>
@@ -25,6 +28,8 @@
 #include <cairn/manifold/se2.hpp>
 #include <cairn/models/motion.hpp>
 #include <cairn/models/sensor.hpp>
+
+#include "filter/planar_slam.hpp"
 
 namespace docs_filter_test {
 
@@ -53,6 +58,13 @@ namespace differentiate {
 using Differentiated = decltype(cairn::automatic(Pendulum{}));
 static_assert(cairn::LinearisedProcess<Differentiated>);
 }  // namespace differentiate
+
+namespace joint {
+#include "snippets/filter/joint_extended_1.inc"
+static_assert(cairn::LinearisedMeasurement<LandmarkSighting>);
+#include "snippets/filter/joint_gaussian_2.inc"
+static_assert(cairn::InverseModel<Place>);
+}  // namespace joint
 
 const cairn::Gaussian<cairn::SE2> planar_prior{cairn::SE2(), 0.01 * cairn::Matrix<3>::Identity()};
 const cairn::RangeBearing beacon{.beacon = {5, 1}};
@@ -160,6 +172,58 @@ TEST_CASE("docs: the second example of docs/filters.md takes a late measurement 
   CHECK(newest.accepted());
   CHECK(late.accepted());
   CHECK(timeline.time() == 1.4);
+}
+
+/// Two landmarks seen from a robot that drives at 1 m/s, the first twice.
+struct Entry {
+  cairn::Vector<2> control;
+  std::map<int, cairn_test::Sighting::Measurement> sightings;
+};
+const std::vector<Entry> log{
+    {{1.0, 0.0}, {{3, cairn_test::Sighting::measurement(4.0, 0.5)}}},
+    {{1.0, 0.0},
+     {{3, cairn_test::Sighting::measurement(3.2, 0.65)}, {7, cairn_test::Sighting::measurement(2.0, -1.0)}}}};
+
+int slam_with(const cairn_test::Sighting& sighting, double dt, int& used, std::size_t& blocks) {
+#include "snippets/filter/joint_gaussian_1.inc"
+  blocks = landmarks.size();
+  return pose.x() > 1.5 && both.norm() > 0 ? 0 : 2;
+}
+
+TEST_CASE("docs: the first example of joint_gaussian.hpp is EKF-SLAM") {
+  int used = 0;
+  std::size_t blocks = 0;
+  CHECK(slam_with({.range_sigma = 0.2}, 1.0, used, blocks) == 0);
+  CHECK(used == 1);
+  CHECK(blocks == 2);
+}
+
+TEST_CASE("docs: the second example of joint_extended.hpp names the blocks of its steps") {
+  const cairn_test::Sighting sighting;
+  const cairn::Vector<2> control(1.0, 0.0);
+  const double dt = 0.1;
+  const auto z = cairn_test::Sighting::measurement(4.0, 0.5);
+  cairn::JointGaussian<cairn::SE2, cairn::Vector<2>> belief;
+  const auto robot = belief.add(cairn::SE2(), cairn::Matrix<3>::Zero()).id;
+  const auto landmark = belief.augment(cairn::inverted(sighting), z, robot).id;
+#include "snippets/filter/joint_extended_2.inc"
+  CHECK(moved == cairn::Status::accepted);
+  CHECK(distance < 2.0);
+  CHECK(seen.accepted());
+}
+
+TEST_CASE("docs: the third example of docs/filters.md grows and forgets") {
+  const cairn_test::Sighting sighting;
+  const cairn::Vector<2> control(1.0, 0.0);
+  const double dt = 0.1;
+  const auto z = cairn_test::Sighting::measurement(4.0, 0.5);
+#include "snippets/docs/filters_3.inc"
+  CHECK(moved == cairn::Status::accepted);
+  CHECK(distance < 2.0);
+  CHECK(seen.accepted());
+  CHECK(counts == cairn::Status::accepted);
+  CHECK(gone == cairn::Status::accepted);
+  CHECK(belief.dof() == 5);
 }
 
 }  // namespace docs_filter_test

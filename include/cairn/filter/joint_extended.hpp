@@ -160,15 +160,12 @@ private:
                             const Cholesky<M, S>& root, const Matrix<M, M, S>& r) const;
 };
 
-/// The inverse model of a sensor whose State is Product<Known..., New> and that says where the new block must
-/// be:
-///   New initialise(const Known& x, const Measurement& z) const;     // Product<Known...> where they are
-///   several
-/// One Gauss-Newton step of the new block follows, which matters where z has more numbers than it. With H =
-/// [H_k H_n] and N = H_n^T R^-1 H_n: jacobian -N^-1 H_n^T R^-1 H_k, noise N^-1. That is an update with a new
-/// block of infinite variance, but for what z says beyond the block, which is dropped: nothing, where the
-/// sensor sees the block relative to the known ones. Where z does not determine the block the noise is NaN,
-/// and refused.
+/// The inverse model of a sensor whose State is Product<Known..., New> and whose initialise(x, z) says where
+/// the new block must be, x the known block, or the Product<Known...> of several. One Gauss-Newton step of
+/// the new block follows, which matters where z has more numbers than it. With H = [H_k H_n] and N = H_n^T
+/// R^-1 H_n: jacobian -N^-1 H_n^T R^-1 H_k, noise N^-1. That is an update with a new block of infinite
+/// variance, but for what z says beyond the block, which is dropped: nothing, where the sensor sees the block
+/// relative to the known ones. Where z does not determine the block the noise is NaN, and refused.
 template <LinearisedMeasurement H>
 struct Inverted;
 template <LinearisedMeasurement H>
