@@ -7,6 +7,7 @@ endif()
 option(CAIRN_WARNINGS_AS_ERRORS "Treat warnings as errors" ${PROJECT_IS_TOP_LEVEL})
 set(CAIRN_SANITIZE "" CACHE STRING "Sanitizers of the project's own targets, e.g. address,undefined")
 option(CAIRN_FUZZ "Build the fuzz targets of tests/fuzz as programs of clang's libFuzzer" OFF)
+option(CAIRN_LONG_TESTS "Build the tests that take longest to compile too" ON)
 option(CAIRN_NATIVE "Compile the project's own targets with -march=native" OFF)
 
 add_library(cairn_development INTERFACE)
