@@ -156,8 +156,8 @@ inline ExactBelief exact_update(const ExactProblem& p, const ExactBelief& prior)
   const QuadMatrix gain = turned(gain_t);
   const QuadMatrix left = plus(quad_identity(prior.mean.rows), times(gain, p.design), -1);
   out.mean = plus(prior.mean, times(gain, residual));
-  out.covariance = plus(times(left, times(prior.covariance, turned(left))),
-                        times(gain, times(p.sensor_noise, gain_t)));
+  out.covariance =
+      plus(times(left, times(prior.covariance, turned(left))), times(gain, times(p.sensor_noise, gain_t)));
   return out;
 }
 

@@ -680,14 +680,18 @@ TEST_SUITE("sizes") {
       CHECK_FALSE(
           cairn::SquareRootInformation<X>{bad.mean, bad.covariance, X::Zero(3)}.gaussian().has_value());
       CHECK_THROWS_AS(static_cast<void>(Gaussian<X>::checked(bad.mean, bad.covariance)), cairn::Error);
-      CHECK_THROWS_AS(static_cast<void>(cairn::smooth_back({good, bad, matrix({3, 3}, 1.0), good.covariance}, good)),
-                      std::logic_error);
+      CHECK_THROWS_AS(
+          static_cast<void>(cairn::smooth_back({good, bad, matrix({3, 3}, 1.0), good.covariance}, good)),
+          std::logic_error);
     }
     CHECK_THROWS_AS(static_cast<void>(cairn::nees(good, two.mean)), std::logic_error);
     const Matrix<d> square = matrix({3, 3}, 1.0), oblong = matrix({3, 2}, 1.0);
-    CHECK_THROWS_AS(static_cast<void>(cairn::smooth_back({good, good, oblong, square}, good)), std::logic_error);
-    CHECK_THROWS_AS(static_cast<void>(cairn::smooth_back({good, good, square, oblong}, good)), std::logic_error);
-    CHECK_THROWS_AS(static_cast<void>(cairn::smooth_back({good, good, square, square}, two)), std::logic_error);
+    CHECK_THROWS_AS(static_cast<void>(cairn::smooth_back({good, good, oblong, square}, good)),
+                    std::logic_error);
+    CHECK_THROWS_AS(static_cast<void>(cairn::smooth_back({good, good, square, oblong}, good)),
+                    std::logic_error);
+    CHECK_THROWS_AS(static_cast<void>(cairn::smooth_back({good, good, square, square}, two)),
+                    std::logic_error);
     CHECK_THROWS_AS(static_cast<void>(cairn::ModeBelief<X, 2>{{good, two}, {0.5, 0.5}}.combined()),
                     std::logic_error);
     CHECK_THROWS_AS(static_cast<void>(cairn::Ensemble<X>{{good.mean, two.mean}}.gaussian()),
