@@ -60,6 +60,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/detail/covariance.hpp>
 #include <cairn/filter/detail/joint_covariance.hpp>
 #include <cairn/filter/detail/plain_matrix.hpp>
 #include <cairn/filter/gaussian.hpp>
