@@ -26,6 +26,11 @@ class MultiKdTree;  // multi_kd_tree.hpp
 
 namespace detail {
 
+template <class Index>
+inline constexpr bool is_multi_kd_tree = false;
+template <class Scalar, std::size_t Dim, class M>
+inline constexpr bool is_multi_kd_tree<MultiKdTree<Scalar, Dim, M>> = true;
+
 /// For searches of other headers: the trees of a multi-kd-tree, which hold erased points too, and who is not.
 struct ForestAccess {
   template <class Index>
@@ -39,6 +44,11 @@ struct ForestAccess {
   template <class Index>
   [[nodiscard]] static const std::vector<PointState>& states(const Index& index) noexcept {
     return index.state_;
+  }
+  /// After loading: which ids were given. Those that the index holds must be live in `states` too.
+  template <class Index>
+  static void set_states(Index& index, std::vector<PointState> states) noexcept {
+    index.state_ = std::move(states);
   }
 };
 

@@ -32,11 +32,11 @@ public:
   [[gnu::always_inline]] void search(const Real* query, std::size_t dim, const M& metric, C& collector,
                                      Work& work) {
     unsigned deepest = 0;
-    for (const Tree* tree : trees_) deepest = std::max(deepest, tree->boxes().levels());
+    for (const Tree* tree : trees_) deepest = std::max(deepest, TreeAccess::boxes(*tree).levels());
     for (unsigned round = 0; round <= deepest; ++round)
       for (std::size_t i = trees_.size(); i-- > 0;) {
-        const auto& boxes = trees_[i]->boxes();
-        const auto& blocks = trees_[i]->blocks();
+        const auto& boxes = TreeAccess::boxes(*trees_[i]);
+        const auto& blocks = TreeAccess::blocks(*trees_[i]);
         const unsigned levels = boxes.levels();
         if (round + levels < deepest) continue;
         if (round + levels == deepest)
@@ -46,14 +46,14 @@ public:
         if (round < deepest) boxes.prefetch(walks_[i], blocks, dim);
       }
     for (std::size_t i = trees_.size(); i-- > 0;)
-      while (
-          trees_[i]->boxes().advance(walks_[i], trees_[i]->blocks(), query, dim, metric, collector, work)) {
+      while (TreeAccess::boxes(*trees_[i])
+                 .advance(walks_[i], TreeAccess::blocks(*trees_[i]), query, dim, metric, collector, work)) {
       }
   }
 
 private:
   std::span<const Tree* const> trees_;
-  std::array<typename Tree::Boxes::Walk, most> walks_;
+  std::array<typename BoxTree<typename Tree::Coordinate>::Walk, most> walks_;
 };
 
 /// Offers the points of all trees, which are smallest first, to a collector. `query` holds checked numbers.
@@ -65,7 +65,8 @@ void search_in_step(std::span<const Tree* const> trees, const typename Tree::Rea
       const std::size_t count = std::min(rest.size(), WalksInStep<Tree>::most);
       const Tree& any = *rest.back();
       if (count == 1) {
-        any.boxes().search(any.blocks(), query, any.dimension(), any.metric(), collector, work);
+        TreeAccess::boxes(any).search(TreeAccess::blocks(any), query, any.dimension(), any.metric(),
+                                      collector, work);
       } else {
         WalksInStep<Tree> walks(rest.last(count));
         walks.search(query, any.dimension(), any.metric(), collector, work);
