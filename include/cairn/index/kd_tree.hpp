@@ -259,6 +259,15 @@ private:
   detail::KdParts<Scalar> parts_;
 };
 
+namespace detail {
+
+template <class Tree>
+inline constexpr bool is_kd_tree = false;
+template <class Scalar, std::size_t Dim, class M>
+inline constexpr bool is_kd_tree<KdTree<Scalar, Dim, M>> = true;
+
+}  // namespace detail
+
 /// Without arguments in <> a tree keeps coordinates as the points have them: doubles stay doubles.
 template <PointSet Points, class M = L2>
   requires(!std::convertible_to<M, std::span<const PointId>>)

@@ -66,6 +66,7 @@ public:
 
   /// Throws Error where the query is not finite or of another dimension.
   template <Point Query>
+    requires detail::is_kd_tree<Tree>
   NearestFirst(const Tree& tree, const Query& query) : tree_(&tree), query_(tree.dimension()) {
     if (tree.empty()) return;
     detail::copy_point<Real>(query, query_.size(), query_.data(), {"NearestFirst: query", 0});

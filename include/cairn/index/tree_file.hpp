@@ -146,11 +146,6 @@ template <class Scalar, std::size_t Dim>
   return points;
 }
 
-template <class Tree>
-inline constexpr bool is_kd_tree = false;
-template <class Scalar, std::size_t Dim, class M>
-inline constexpr bool is_kd_tree<KdTree<Scalar, Dim, M>> = true;
-
 }  // namespace detail
 
 /// Writes the points and ids of a tree. Throws Error where the stream fails; open it in binary mode.
