@@ -210,12 +210,18 @@ private:
   /// Exact search for checked numbers.
   template <class C>
   void search_row(const Real* row, C& collector, Work& work) const {
-    if (use_boxes())
-      detail::with_widest_lanes([&]() CAIRN_INLINED {
-        parts_.boxes.search(parts_.blocks, row, dimension(), metric_, collector, work);
-      });
+    if constexpr (Dim != dynamic_dim && Dim <= detail::few_axes)
+      search_boxes(row, collector, work);
+    else if (Dim == dynamic_dim && use_boxes())
+      search_boxes(row, collector, work);
     else
       search_splits(row, collector, work);
+  }
+  template <class C>
+  void search_boxes(const Real* row, C& collector, Work& work) const {
+    detail::with_widest_lanes([&]() CAIRN_INLINED {
+      parts_.boxes.search(parts_.blocks, row, dimension(), metric_, collector, work);
+    });
   }
 
   template <class C>

@@ -205,12 +205,8 @@ public:
     detail::copy_point<Real>(query, dimension(), row.data(), {"MultiKdTree: query", 0});
     detail::wrap_row(metric_, dimension(), row.data());
     Work done;
-    if (live_ == forest_.stored()) {
-      search_row(row.data(), collector, done);
-    } else {
-      detail::OnlyLive<Real, C> only_live{&state_, &collector};
-      search_row(row.data(), only_live, done);
-    }
+    auto only_live = detail::ForestAccess::only_live(*this, collector);
+    search_row(row.data(), only_live, done);
     if (work != nullptr) *work += done;
     return true;
   }
@@ -246,7 +242,9 @@ private:
   template <class C>
   void search_row(const Real* row, C& collector, Work& work) const {
     const std::span<const Tree* const> trees = forest_.trees();
-    if (dimension() <= detail::few_axes)
+    if constexpr (Dim != dynamic_dim && Dim <= detail::few_axes)
+      detail::search_in_step(trees, row, collector, work);
+    else if (Dim == dynamic_dim && dimension() <= detail::few_axes)
       detail::search_in_step(trees, row, collector, work);
     else
       for (std::size_t i = trees.size(); i-- > 0;)

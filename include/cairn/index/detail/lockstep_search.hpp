@@ -33,7 +33,9 @@ public:
                                      Work& work) {
     unsigned deepest = 0;
     for (const Tree* tree : trees_) deepest = std::max(deepest, TreeAccess::boxes(*tree).levels());
-    for (unsigned round = 0; round <= deepest; ++round)
+    // Round by round one move of each tree, then each to its end. One call of advance() for both: it is
+    // inlined, for every width of vectors and every collector.
+    for (unsigned round = 0; round <= deepest + 1; ++round)
       for (std::size_t i = trees_.size(); i-- > 0;) {
         const auto& boxes = TreeAccess::boxes(*trees_[i]);
         const auto& blocks = TreeAccess::blocks(*trees_[i]);
@@ -42,12 +44,9 @@ public:
         if (round + levels == deepest)
           boxes.enter(walks_[i], query, dim, metric, collector, work);
         else
-          boxes.advance(walks_[i], blocks, query, dim, metric, collector, work);
-        if (round < deepest) boxes.prefetch(walks_[i], blocks, dim);
-      }
-    for (std::size_t i = trees_.size(); i-- > 0;)
-      while (TreeAccess::boxes(*trees_[i])
-                 .advance(walks_[i], TreeAccess::blocks(*trees_[i]), query, dim, metric, collector, work)) {
+          while (boxes.advance(walks_[i], blocks, query, dim, metric, collector, work))
+            if (round <= deepest) break;
+        if (round < deepest && trees_.size() > 1) boxes.prefetch(walks_[i], blocks, dim);
       }
   }
 
@@ -64,13 +63,8 @@ void search_in_step(std::span<const Tree* const> trees, const typename Tree::Rea
     for (auto rest = trees; !rest.empty();) {
       const std::size_t count = std::min(rest.size(), WalksInStep<Tree>::most);
       const Tree& any = *rest.back();
-      if (count == 1) {
-        TreeAccess::boxes(any).search(TreeAccess::blocks(any), query, any.dimension(), any.metric(),
-                                      collector, work);
-      } else {
-        WalksInStep<Tree> walks(rest.last(count));
-        walks.search(query, any.dimension(), any.metric(), collector, work);
-      }
+      WalksInStep<Tree> walks(rest.last(count));
+      walks.search(query, any.dimension(), any.metric(), collector, work);
       rest = rest.first(rest.size() - count);
     }
   });
