@@ -41,11 +41,12 @@ public:
         const auto& blocks = TreeAccess::blocks(*trees_[i]);
         const unsigned levels = boxes.levels();
         if (round + levels < deepest) continue;
-        if (round + levels == deepest)
-          boxes.enter(walks_[i], query, dim, metric, collector, work);
-        else
-          while (boxes.advance(walks_[i], blocks, query, dim, metric, collector, work))
-            if (round <= deepest) break;
+        if (round + levels == deepest) {
+          boxes.enter(walks_[i]);
+          if (levels == 0) continue;  // a leaf comes after the larger trees' first
+        }
+        while (boxes.advance(walks_[i], blocks, query, dim, metric, collector, work))
+          if (round <= deepest) break;
         if (round < deepest && trees_.size() > 1) boxes.prefetch(walks_[i], blocks, dim);
       }
   }
