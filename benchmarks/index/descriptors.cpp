@@ -15,6 +15,7 @@
 #include <cairn/core/parallel.hpp>
 #include <cairn/index/best_bin_first.hpp>
 #include <cairn/index/descriptor_index.hpp>
+#include <cairn/index/kd_tree.hpp>
 #include <cairn/index/packed_points.hpp>
 #include <cairn/index/principal_axes.hpp>
 

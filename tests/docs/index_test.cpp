@@ -15,10 +15,12 @@
 
 #include <cairn/core/random.hpp>
 #include <cairn/index/axis_metrics.hpp>
+#include <cairn/index/batch_search.hpp>
 #include <cairn/index/best_bin_first.hpp>
 #include <cairn/index/box_query.hpp>
 #include <cairn/index/collectors.hpp>
 #include <cairn/index/descriptor_index.hpp>
+#include <cairn/index/index.hpp>
 #include <cairn/index/kd_forest.hpp>
 #include <cairn/index/kd_tree.hpp>
 #include <cairn/index/landmark_store.hpp>
@@ -63,6 +65,29 @@ TEST_CASE("docs: the example of kd_tree.hpp finds the nearest point and all with
 #include "snippets/index/kd_tree_1.inc"
   CHECK(used == std::vector<cairn::PointId>{1, 1, 0, 2, 1});
   CHECK(my_collector.id == 1);
+}
+
+using Scan = std::vector<std::array<float, 3>>;
+#include "snippets/index/index_1.inc"
+
+TEST_CASE("docs: the example of index.hpp counts in any index what was seen before") {
+  const Scan scan{{0, 0, 0.01F}, {1, 0.5F, 0}, {0, 2, 0}};
+  CHECK(seen_before(cairn::BruteForce<float, 3>(three_points), scan) == 2);
+  CHECK(seen_before(cairn::KdTree<float, 3>(three_points), scan) == 2);
+  CHECK(seen_before(cairn::DescriptorIndex(three_points), scan) == 2);
+}
+
+TEST_CASE("docs: the example of batch_search.hpp answers every query") {
+  const auto& queries = three_points;
+  const cairn::KdTree<float, 3> tree(three_points);
+  const cairn::DescriptorIndex index(three_points);
+#include "snippets/index/batch_search_1.inc"
+  REQUIRE(hits.size() == 30);
+  for (std::size_t i = 0; i < 3; ++i) {
+    CHECK(hits[10 * i].id == i);
+    CHECK(hits[10 * i + 3].id == cairn::no_point);
+    CHECK(two[i].id() == i);
+  }
 }
 
 TEST_CASE("docs: the example of multi_kd_tree.hpp finds what was not erased") {
@@ -122,8 +147,14 @@ TEST_CASE("docs: the example of packed_points.hpp finds each descriptor") {
 TEST_CASE("docs: the example of descriptor_index.hpp finds a descriptor") {
   const Descriptors descriptors = some_descriptors();
   const auto& query = descriptors[42];
+  std::vector<cairn::PointId> used;
+  const auto use = [&](cairn::PointId id, float distance) {
+    CHECK(distance == 0);
+    used.push_back(id);
+  };
 #include "snippets/index/descriptor_index_1.inc"
   CHECK(two.id() == 42);
+  CHECK(used == std::vector<cairn::PointId>{42});
 }
 
 TEST_CASE("docs: the example of kd_forest.hpp finds a descriptor") {

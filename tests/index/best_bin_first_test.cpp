@@ -11,6 +11,7 @@
 
 #include <cairn/index/best_bin_first.hpp>
 #include <cairn/index/brute_force.hpp>
+#include <cairn/index/kd_tree.hpp>
 #include <cairn/index/principal_axes.hpp>
 #include <cairn/index/ratio_test.hpp>
 

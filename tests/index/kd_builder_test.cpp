@@ -26,9 +26,9 @@ std::vector<double> fingerprint(const Tree& tree) {
   });
   for (unsigned depth = 0; depth < tree.depth(); ++depth)
     for (std::size_t slot = 0; slot < std::size_t{1} << depth; ++slot) {
-      if (tree.layout().leaves_below(depth, slot).size() < 2) continue;
-      numbers.push_back(static_cast<double>(tree.split(depth, slot).value));
-      numbers.push_back(tree.split(depth, slot).axis);
+      if (cairn::detail::TreeAccess::layout(tree).leaves_below(depth, slot).size() < 2) continue;
+      numbers.push_back(static_cast<double>(cairn::detail::TreeAccess::split(tree, depth, slot).value));
+      numbers.push_back(cairn::detail::TreeAccess::split(tree, depth, slot).axis);
     }
   return numbers;
 }
@@ -81,7 +81,8 @@ TEST_SUITE("kd_builder") {
         done += piece;
         largest = std::max(largest, piece);
       }
-      const auto tree = cairn::KdTree<float, 3>::from_parts(builder.finish(), 3, {});
+      const auto tree =
+          cairn::detail::TreeAccess::from_parts<cairn::KdTree<float, 3>>(builder.finish(), 3, {});
       CHECK(fingerprint(tree) == fingerprint(cairn::KdTree<float, 3>(cairn::Rows<float>(rows, 3))));
       CHECK(largest <= std::max<std::size_t>(count, 65536));  // a split of all, or a subtree of 4096 points
       const auto promised = static_cast<double>(builder.work(count));

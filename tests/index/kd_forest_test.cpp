@@ -44,7 +44,7 @@ TEST_SUITE("kd_forest") {
           const auto numbers = cairn_test::make_points<float>(shape, count, dim, random);
           const Forest forest(Rows<float>(numbers, dim), {.trees = 3, .turned_axes = 8});
           REQUIRE(forest.size() == count);
-          REQUIRE(forest.trees().size() == 3);
+          REQUIRE(cairn::detail::KdForestAccess::trees(forest).size() == 3);
           const cairn::BruteForce<float> brute(Rows<float>(numbers, dim));
           for (int round = 0; round < 8; ++round) {
             const auto query = cairn_test::make_points<float>(shape, 1, dim, random);
@@ -92,8 +92,10 @@ TEST_SUITE("kd_forest") {
     }
     CHECK(right == 100);  // the query's own leaf is the first in every tree
     CHECK(right_alone == 100);
-    const auto* first = forest.trees()[1].blocks().ids(0);
-    const auto* second = forest.trees()[2].blocks().ids(0);
+    const auto* first =
+        cairn::detail::TreeAccess::blocks(cairn::detail::KdForestAccess::trees(forest)[1]).ids(0);
+    const auto* second =
+        cairn::detail::TreeAccess::blocks(cairn::detail::KdForestAccess::trees(forest)[2]).ids(0);
     CHECK(!std::equal(first, first + 16, second));
   }
 
@@ -105,9 +107,10 @@ TEST_SUITE("kd_forest") {
     int same = 0;
     for (cairn::PointId id = 0; id < 3000; id += 30) {
       std::set<cairn::PointId> expected;
-      for (const auto& tree : forest.trees())
-        for (std::size_t leaf = 0; leaf < tree.blocks().leaves(); ++leaf) {
-          const std::set<cairn::PointId> ids(tree.blocks().ids(leaf), tree.blocks().ids(leaf) + 16);
+      for (const auto& tree : cairn::detail::KdForestAccess::trees(forest))
+        for (std::size_t leaf = 0; leaf < cairn::detail::TreeAccess::blocks(tree).leaves(); ++leaf) {
+          const std::set<cairn::PointId> ids(cairn::detail::TreeAccess::blocks(tree).ids(leaf),
+                                             cairn::detail::TreeAccess::blocks(tree).ids(leaf) + 16);
           if (ids.count(id) != 0) expected.insert(ids.begin(), ids.end());
         }
       expected.erase(cairn::no_point);

@@ -13,6 +13,7 @@
 
 #include <cairn/index/axis_metrics.hpp>
 #include <cairn/index/best_bin_first.hpp>
+#include <cairn/index/kd_tree.hpp>
 #include <cairn/index/packed_points.hpp>
 #include <cairn/index/ratio_test.hpp>
 

@@ -11,12 +11,46 @@
 #include <algorithm>
 #include <cstddef>
 #include <exception>
+#include <memory>
 #include <thread>
+#include <type_traits>
 #include <vector>
 
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
+
+namespace detail {
+
+/// body_of(body, begin, end) on `blocks` > 1 threads; compiled once, whatever the body is.
+inline void run_blocks(std::size_t count, std::size_t blocks,
+                       void (*body_of)(void*, std::size_t, std::size_t), void* body) {
+  const auto start = [&](std::size_t block) {
+    return count / blocks * block + std::min(block, count % blocks);
+  };
+  std::vector<std::exception_ptr> failures(blocks);
+  const auto run = [&](std::size_t block) noexcept {
+#if defined(__cpp_exceptions)
+    try {
+      body_of(body, start(block), start(block + 1));
+    } catch (...) {
+      failures[block] = std::current_exception();
+    }
+#else
+    body_of(body, start(block), start(block + 1));
+#endif
+  };
+  {
+    std::vector<std::jthread> workers;
+    workers.reserve(blocks - 1);
+    for (std::size_t block = 1; block < blocks; ++block) workers.emplace_back(run, block);
+    run(0);
+  }
+  for (const std::exception_ptr& failure : failures)
+    if (failure) std::rethrow_exception(failure);
+}
+
+}  // namespace detail
 
 /// Calls body(begin, end) on contiguous blocks that cover [0, count), on up to `threads` threads (0 counts as
 /// 1; the caller's thread takes the first block). Returns when all are done; the first block's exception that
@@ -29,29 +63,11 @@ void parallel_for(std::size_t count, unsigned threads, Body&& body) {
     if (count > 0) body(std::size_t{0}, count);
     return;
   }
-  const auto start = [&](std::size_t block) {
-    return count / blocks * block + std::min(block, count % blocks);
-  };
-  std::vector<std::exception_ptr> failures(blocks);
-  const auto run = [&](std::size_t block) noexcept {
-#if defined(__cpp_exceptions)
-    try {
-      body(start(block), start(block + 1));
-    } catch (...) {
-      failures[block] = std::current_exception();
-    }
-#else
-    body(start(block), start(block + 1));
-#endif
-  };
-  {
-    std::vector<std::jthread> workers;
-    workers.reserve(blocks - 1);
-    for (std::size_t block = 1; block < blocks; ++block) workers.emplace_back(run, block);
-    run(0);
-  }
-  for (const std::exception_ptr& failure : failures)
-    if (failure) std::rethrow_exception(failure);
+  using Plain = std::remove_reference_t<Body>;
+  detail::run_blocks(
+      count, blocks,
+      [](void* of, std::size_t begin, std::size_t end) { (*static_cast<Plain*>(of))(begin, end); },
+      const_cast<std::remove_const_t<Plain>*>(std::addressof(body)));
 }
 
 }}  // namespace cairn::CAIRN_ABI

@@ -18,14 +18,14 @@
 #include <span>
 #include <vector>
 
-#include <cairn/index/kd_tree.hpp>
+#include <cairn/core/check.hpp>
+#include <cairn/index/collectors.hpp>
+#include <cairn/index/detail/kd_layout.hpp>
+#include <cairn/index/detail/tree_access.hpp>
+#include <cairn/index/metric.hpp>
+#include <cairn/index/points.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
-
-/// How many leaves (of up to 16 points) a search may scan.
-struct Budget {
-  std::size_t leaves = std::numeric_limits<std::size_t>::max();
-};
 
 /// Best-bin-first search over trees of one kind. Holds the queue, so keep one for many searches; one a
 /// thread.
@@ -90,11 +90,11 @@ private:
       ++leaves;
       const Real* const query = query_of(cell.tree);
       const Leaf next{trees[cell.tree], query, descend(*trees[cell.tree], cell, query, collector, done)};
-      next.tree->prefetch_leaf(next.leaf);
-      if (waiting.tree != nullptr) waiting.tree->scan_leaf(waiting.leaf, waiting.query, collector, done);
+      prefetch(next);
+      if (waiting.tree != nullptr) scan(waiting, collector, done);
       waiting = next;
     }
-    if (waiting.tree != nullptr) waiting.tree->scan_leaf(waiting.leaf, waiting.query, collector, done);
+    if (waiting.tree != nullptr) scan(waiting, collector, done);
     if (work != nullptr) *work += done;
     return !(rest < static_cast<Real>(collector.limit()));
   }
@@ -112,6 +112,13 @@ private:
     const Real* query = nullptr;
     std::size_t leaf = 0;
   };
+  static void prefetch(const Leaf& leaf) noexcept {
+    detail::TreeAccess::blocks(*leaf.tree).prefetch(leaf.leaf, leaf.tree->dimension());
+  }
+  template <class C>
+  static void scan(const Leaf& leaf, C& collector, Work& work) {
+    detail::TreeAccess::scan_leaf(*leaf.tree, leaf.leaf, leaf.query, collector, work);
+  }
   /// The path to a cell left the query's side of a split here; `offset` is how far that side is.
   struct Turn {
     Real offset;
@@ -136,10 +143,10 @@ private:
   template <class C>
   std::size_t descend(const Tree& tree, Cell cell, const Real* query, const C& collector, Work& work) {
     for (;; ++cell.depth) {
-      const detail::Range leaves = tree.layout().leaves_below(cell.depth, cell.slot);
+      const detail::Range leaves = detail::TreeAccess::layout(tree).leaves_below(cell.depth, cell.slot);
       if (leaves.size() == 1) return leaves.begin;
       ++work.nodes;
-      const auto& split = tree.split(cell.depth, cell.slot);
+      const auto& split = detail::TreeAccess::split(tree, cell.depth, cell.slot);
       const Real offset = query[split.axis] - static_cast<Real>(split.value);
       const std::uint32_t near = 2 * cell.slot + (offset < 0 ? 0U : 1U);
       const Real old = offset_along(split.axis, cell.turn);

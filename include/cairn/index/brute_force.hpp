@@ -8,11 +8,13 @@
 #include <algorithm>
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
 #include <cairn/core/check.hpp>
 #include <cairn/index/collectors.hpp>
+#include <cairn/index/detail/answers.hpp>
 #include <cairn/index/detail/block_lanes.hpp>
 #include <cairn/index/metric.hpp>
 #include <cairn/index/points.hpp>
@@ -25,6 +27,10 @@ class BruteForce {
 public:
   using Real = detail::RealOf<Scalar>;
   using Hit = Neighbor<Real>;
+  using Coordinate = Scalar;
+  using Measure = M;
+  struct Scratch {};  ///< a search needs none
+  static constexpr std::size_t fixed_dimension = Dim;
   static_assert(detail::is_coordinate<Scalar>,
                 "coordinates are kept as float, double or whole numbers of up to four bytes");
 
@@ -45,42 +51,39 @@ public:
   [[nodiscard]] bool empty() const noexcept { return rows_.empty(); }
   [[nodiscard]] std::size_t dimension() const noexcept { return dim_; }
   [[nodiscard]] const M& metric() const noexcept { return metric_; }
+  /// Memory held, the points included.
+  [[nodiscard]] std::size_t bytes() const noexcept { return rows_.capacity() * sizeof(Scalar); }
 
   /// The nearest point; the first of equally near ones.
   template <Point Query>
-  [[nodiscard]] std::optional<Hit> nearest(const Query& query) const {
-    const std::vector<Hit> found = nearest(query, 1);
-    if (found.empty()) return std::nullopt;
-    return found.front();
+  [[nodiscard]] std::optional<Hit> nearest(const Query& query, Budget = {}) const {
+    return detail::nearest_of<Real>(metric_, [&](auto& collector) { search(query, collector); });
   }
 
   /// The k nearest points, nearest first.
   template <Point Query>
-  [[nodiscard]] std::vector<Hit> nearest(const Query& query, std::size_t k) const {
-    std::vector<Hit> found(std::min(k, size()));
-    KNearest<Real> collector(found.data(), found.size());
-    if (!found.empty()) search(query, collector);
-    collector.restore(metric_);
-    return found;
+  [[nodiscard]] std::vector<Hit> nearest(const Query& query, std::size_t k, Budget = {}) const {
+    return detail::k_nearest_of<Real>(k, size(), metric_, [&](auto& collector) { search(query, collector); });
+  }
+  /// Writes the nearest points, nearest first, as many as `found` has room for; returns how many.
+  template <Point Query>
+  std::size_t nearest(const Query& query, std::span<Hit> found) const {
+    return detail::nearest_into(found, metric_, [&](auto& collector) { search(query, collector); });
   }
 
   /// All points at most `radius` away, nearest first. radius >= 0.
   template <Point Query>
   [[nodiscard]] std::vector<Hit> within(const Query& query, Real radius) const {
     CAIRN_EXPECTS(radius >= 0, "BruteForce::within: a radius is not negative");
-    std::vector<Hit> found;
-    Within<Real> collector(found, detail::largest_reduced(metric_, radius));
-    search(query, collector);
-    for (Hit& hit : found) hit.distance = metric_.restore(hit.distance);
-    std::sort(found.begin(), found.end(), nearer<Real>);
-    return found;
+    return detail::all_within(radius, metric_, [&](auto& collector) { search(query, collector); });
   }
 
-  /// Offers every point that is nearer than the collector's limit, in the order of the set.
+  /// Offers every point that is nearer than the collector's limit, in the order of the set. Returns true:
+  /// nothing is left out.
   template <Point Query, Collector<Real> C>
-  void search(const Query& query, C& collector, Work* work = nullptr) const {
+  bool search(const Query& query, C& collector, Work* work = nullptr) const {
     detail::check_collector<C, M>();
-    if (empty()) return;
+    if (empty()) return true;
     std::vector<Real> row(dim_);
     detail::copy_point<Real>(query, dim_, row.data(), {"BruteForce: query", 0});
     detail::wrap_row(metric_, dim_, row.data());
@@ -91,6 +94,23 @@ public:
       if (reduced < static_cast<Real>(collector.limit())) collector.offer(static_cast<PointId>(i), reduced);
     }
     if (work != nullptr) work->distances += size();
+    return true;
+  }
+  /// The same: here a budget leaves nothing out.
+  template <Point Query, Collector<Real> C>
+  bool search(const Query& query, C& collector, const SearchOptions& options) const {
+    return search(query, collector, options.work);
+  }
+  template <Point Query, Collector<Real> C>
+  bool search(const Query& query, C& collector, const SearchOptions& options, Scratch&) const {
+    return search(query, collector, options.work);
+  }
+
+  /// Calls visit(id, std::span<const Scalar>) for every point, in the order of the set.
+  template <class Visit>
+  void for_each(Visit&& visit) const {
+    for (std::size_t i = 0; i < size(); ++i)
+      visit(static_cast<PointId>(i), std::span<const Scalar>(rows_.data() + i * dim_, dim_));
   }
 
 private:

@@ -76,6 +76,18 @@ struct Work {
   bool operator==(const Work&) const = default;
 };
 
+/// How many leaves (of up to 16 points) a search may scan.
+struct Budget {
+  std::size_t leaves = std::numeric_limits<std::size_t>::max();
+  [[nodiscard]] bool unlimited() const noexcept { return leaves == std::numeric_limits<std::size_t>::max(); }
+};
+
+/// What a search may cost, and where it says what it did cost: `{.budget = {.leaves = 24}, .work = &work}`.
+struct SearchOptions {
+  Budget budget{};
+  Work* work = nullptr;  ///< what was done is added to it
+};
+
 /// Keeps the nearest point; of equally near ones the first offered.
 template <class Real>
 class Nearest {

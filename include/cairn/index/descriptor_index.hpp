@@ -7,9 +7,10 @@
 ///
 /// ```cpp
 /// const cairn::DescriptorIndex index(descriptors);           // refers to them; a quarter of their memory
-/// decltype(index)::Search search;                            // one a thread
+/// decltype(index)::Scratch scratch;                          // one a thread
 /// cairn::NearestTwo<float> two;
-/// search.search(index, query, two, {.leaves = 64});
+/// index.search(query, two, {.budget = {.leaves = 64}}, scratch);
+/// if (const auto hit = index.nearest(query, {.leaves = 64})) use(hit->id, hit->distance);
 /// ```
 ///
 /// The cells begin as those of a kd-tree and are moved to their means (k_means.hpp). A query asks for its
@@ -29,12 +30,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include <cairn/core/check.hpp>
-#include <cairn/index/best_bin_first.hpp>
 #include <cairn/index/collectors.hpp>
+#include <cairn/index/detail/answers.hpp>
 #include <cairn/index/detail/byte_blocks.hpp>
 #include <cairn/index/detail/k_means.hpp>
 #include <cairn/index/metric.hpp>
@@ -55,6 +58,12 @@ template <PointSet Points>
 class DescriptorIndex {
 public:
   using Real = float;
+  using Hit = Neighbor<float>;
+  using Coordinate = float;
+  using Measure = L2;
+  class Search;
+  using Scratch = Search;  ///< what a search needs
+  static constexpr std::size_t fixed_dimension = dynamic_dim;
 
   /// Throws Error, naming the point, for coordinates that are not finite, for points of different dimensions,
   /// and for more than 16384 dimensions. O(n log n + cells^2).
@@ -81,6 +90,7 @@ public:
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
   [[nodiscard]] std::size_t dimension() const noexcept { return low_.size(); }
+  [[nodiscard]] L2 metric() const noexcept { return {}; }
   [[nodiscard]] std::size_t cells() const noexcept { return radii_.size(); }
   /// True where every coordinate is a byte's value exactly, so that distances of bytes are distances.
   [[nodiscard]] bool bytes_are_exact() const noexcept { return error_ == 0; }
@@ -89,6 +99,52 @@ public:
     return members_.bytes() + means_.bytes() + ids_.capacity() * sizeof(PointId) +
            first_block_.capacity() * sizeof(std::size_t) +
            (radii_.capacity() + low_.capacity()) * sizeof(float);
+  }
+
+  /// The nearest point, of all or of those that a search under a budget meets.
+  template <Point Query>
+  [[nodiscard]] std::optional<Hit> nearest(const Query& query, Budget budget = {}) const {
+    return detail::nearest_of<float>(L2{},
+                                     [&](auto& collector) { search(query, collector, {.budget = budget}); });
+  }
+  /// The k nearest, nearest first.
+  template <Point Query>
+  [[nodiscard]] std::vector<Hit> nearest(const Query& query, std::size_t k, Budget budget = {}) const {
+    return detail::k_nearest_of<float>(
+        k, size(), L2{}, [&](auto& collector) { search(query, collector, {.budget = budget}); });
+  }
+  /// Writes the nearest points, nearest first, as many as `found` has room for; returns how many.
+  template <Point Query>
+  std::size_t nearest(const Query& query, std::span<Hit> found) const {
+    return detail::nearest_into(found, L2{}, [&](auto& collector) { search(query, collector); });
+  }
+  /// All points at most `radius` away, nearest first. radius >= 0.
+  template <Point Query>
+  [[nodiscard]] std::vector<Hit> within(const Query& query, float radius) const {
+    CAIRN_EXPECTS(radius >= 0, "DescriptorIndex::within: a radius is not negative");
+    return detail::all_within(radius, L2{}, [&](auto& collector) { search(query, collector); });
+  }
+
+  /// As Search; `scratch` keeps memory from search to search. Returns true where nothing nearer was left out.
+  template <Point Query, Collector<float> C>
+  bool search(const Query& query, C& collector, const SearchOptions& options, Scratch& scratch) const {
+    return scratch.search(*this, query, collector, options.budget, options.work);
+  }
+  template <Point Query, Collector<float> C>
+  bool search(const Query& query, C& collector, const SearchOptions& options = {}) const {
+    Scratch scratch;
+    return search(query, collector, options, scratch);
+  }
+
+  /// Calls visit(id, std::span<const float>) for every point, in the order of the set; the span is valid
+  /// during the call.
+  template <class Visit>
+  void for_each(Visit&& visit) const {
+    std::vector<float> row(dimension());
+    for (std::size_t i = 0; i < size(); ++i) {
+      detail::copy_point<float>((*points_)[i], row.size(), row.data(), {"DescriptorIndex: point", i});
+      visit(static_cast<PointId>(i), std::span<const float>(row));
+    }
   }
 
   /// Searches under a budget; keep one for many searches, one a thread.

@@ -7,9 +7,9 @@
 ///
 /// ```cpp
 /// const cairn::KdForest<64> forest(descriptors, {.trees = 2});
-/// cairn::BestBinFirst<cairn::KdForest<64>> search;  // one a thread
+/// cairn::KdForest<64>::Scratch scratch;  // one a thread
 /// cairn::NearestTwo<float> two;
-/// search.search(forest, query, two, {.leaves = 64});
+/// forest.search(query, two, {.budget = {.leaves = 64}}, scratch);
 /// ```
 ///
 /// The first tree splits along the principal axes; the others turn the foremost of them by random rotations,
@@ -28,12 +28,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/random.hpp>
 #include <cairn/index/best_bin_first.hpp>
+#include <cairn/index/detail/answers.hpp>
 #include <cairn/index/kd_tree.hpp>
 #include <cairn/index/principal_axes.hpp>
 
@@ -45,12 +47,20 @@ struct KdForestOptions {
   std::uint64_t seed = 1;        ///< the same seed gives the same forest
 };
 
+namespace detail {
+struct KdForestAccess;
+}  // namespace detail
+
 /// Const methods may run at the same time.
 template <std::size_t Dim = dynamic_dim>
 class KdForest {
 public:
-  using Tree = KdTree<float, Dim>;
   using Real = float;
+  using Hit = Neighbor<float>;
+  using Coordinate = float;
+  using Measure = L2;
+  using Scratch = BestBinFirst<KdForest>;  ///< what a search needs
+  static constexpr std::size_t fixed_dimension = Dim;
 
   KdForest() = default;
 
@@ -85,12 +95,60 @@ public:
   [[nodiscard]] std::size_t size() const noexcept { return trees_.empty() ? 0 : trees_.front().size(); }
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
   [[nodiscard]] std::size_t dimension() const noexcept { return empty() ? Dim : trees_.front().dimension(); }
-  [[nodiscard]] std::span<const Tree> trees() const noexcept { return trees_; }
+  [[nodiscard]] L2 metric() const noexcept { return {}; }
   [[nodiscard]] std::size_t bytes() const noexcept {
     std::size_t sum = rows_.capacity() * sizeof(float);
     for (const Tree& tree : trees_) sum += tree.bytes();
     return sum;
   }
+
+  /// The nearest point, of all or of those that a search under a budget meets.
+  template <Point Query>
+  [[nodiscard]] std::optional<Hit> nearest(const Query& query, Budget budget = {}) const {
+    return detail::nearest_of<float>(L2{},
+                                     [&](auto& collector) { search(query, collector, {.budget = budget}); });
+  }
+  /// The k nearest, nearest first.
+  template <Point Query>
+  [[nodiscard]] std::vector<Hit> nearest(const Query& query, std::size_t k, Budget budget = {}) const {
+    return detail::k_nearest_of<float>(
+        k, size(), L2{}, [&](auto& collector) { search(query, collector, {.budget = budget}); });
+  }
+  /// Writes the nearest points, nearest first, as many as `found` has room for; returns how many.
+  template <Point Query>
+  std::size_t nearest(const Query& query, std::span<Hit> found) const {
+    return detail::nearest_into(found, L2{}, [&](auto& collector) { search(query, collector); });
+  }
+  /// All points at most `radius` away, nearest first. radius >= 0.
+  template <Point Query>
+  [[nodiscard]] std::vector<Hit> within(const Query& query, float radius) const {
+    CAIRN_EXPECTS(radius >= 0, "KdForest::within: a radius is not negative");
+    return detail::all_within(radius, L2{}, [&](auto& collector) { search(query, collector); });
+  }
+
+  /// As BestBinFirst; `scratch` keeps memory from search to search. Returns true where nothing nearer was
+  /// left out.
+  template <Point Query, Collector<float> C>
+  bool search(const Query& query, C& collector, const SearchOptions& options, Scratch& scratch) const {
+    return scratch.search(*this, query, collector, options.budget, options.work);
+  }
+  template <Point Query, Collector<float> C>
+  bool search(const Query& query, C& collector, const SearchOptions& options = {}) const {
+    Scratch scratch;
+    return search(query, collector, options, scratch);
+  }
+
+  /// Calls visit(id, std::span<const float>) for every point, in the order of the set.
+  template <class Visit>
+  void for_each(Visit&& visit) const {
+    const std::size_t dim = dimension();
+    for (std::size_t i = 0; i < size(); ++i)
+      visit(static_cast<PointId>(i), std::span<const float>(rows_.data() + i * dim, dim));
+  }
+
+private:
+  friend struct detail::KdForestAccess;
+  using Tree = KdTree<float, Dim>;
 
   /// Writes the query (dimension() numbers) as each tree sees it, one after the other.
   void turn(const float* query, float* turned) const noexcept {
@@ -118,7 +176,6 @@ public:
     return sum;
   }
 
-private:
   [[nodiscard]] float distance_from_mean(const float* point) const noexcept {
     const std::span<const float> mean = axes_.front().mean();
     float sum = 0;
@@ -167,6 +224,27 @@ private:
 
 namespace detail {
 
+struct KdForestAccess {
+  template <class Forest>
+  using TreeOf = typename Forest::Tree;
+  template <class Forest>
+  [[nodiscard]] static auto trees(const Forest& forest) noexcept {
+    return std::span<const TreeOf<Forest>>(forest.trees_);
+  }
+  template <class Forest>
+  static void turn(const Forest& forest, const float* query, float* turned) noexcept {
+    forest.turn(query, turned);
+  }
+  template <class Forest>
+  [[nodiscard]] static float rounding(const Forest& forest, const float* query) noexcept {
+    return forest.rounding(query);
+  }
+  template <class Forest>
+  [[nodiscard]] static float reduced_distance(const Forest& forest, const float* query, PointId id) noexcept {
+    return forest.reduced_distance(query, id);
+  }
+};
+
 /// Which points a search has met: a number a point, so that nothing is cleared between searches.
 class MetBefore {
 public:
@@ -199,7 +277,7 @@ public:
         query_(query),
         collector_(collector),
         met_(met),
-        rounding_(forest.rounding(query)),
+        rounding_(KdForestAccess::rounding(forest, query)),
         // Sums of squares, and bounds of cells at up to 32 splits, are rounded too.
         growth_(1 + (static_cast<float>(forest.dimension()) + 160) * std::numeric_limits<float>::epsilon()) {
     met.start(forest.size());
@@ -208,7 +286,7 @@ public:
   [[nodiscard]] float limit() const noexcept { return limit_; }
   void offer(PointId id, float turned) {
     if (!(turned < limit_) || met_(id)) return;  // the limit may have come down within a leaf
-    const float reduced = forest_.reduced_distance(query_, id);
+    const float reduced = KdForestAccess::reduced_distance(forest_, query_, id);
     if (!(reduced < static_cast<float>(collector_.limit()))) return;
     collector_.offer(id, reduced);
     widen();
@@ -248,23 +326,25 @@ public:
     const std::size_t dim = forest.dimension();
     row_.resize(dim);
     detail::copy_point<float>(query, dim, row_.data(), {"BestBinFirst: query", 0});
-    turned_.resize(dim * forest.trees().size());
-    forest.turn(row_.data(), turned_.data());
+    const auto trees = detail::KdForestAccess::trees(forest);
+    turned_.resize(dim * trees.size());
+    detail::KdForestAccess::turn(forest, row_.data(), turned_.data());
     trees_.clear();
     queries_.clear();
-    for (const auto& tree : forest.trees()) {
+    for (const auto& tree : trees) {
       queries_.push_back(turned_.data() + trees_.size() * dim);
       trees_.push_back(&tree);
     }
-    using Tree = typename KdForest<Dim>::Tree;
     detail::MeasuredOnce<KdForest<Dim>, C> measured(forest, row_.data(), collector, met_);
     return search_.search(std::span<const Tree* const>(trees_), std::span<const float* const>(queries_),
                           measured, budget, work);
   }
 
 private:
-  BestBinFirst<typename KdForest<Dim>::Tree> search_;
-  std::vector<const typename KdForest<Dim>::Tree*> trees_;
+  using Tree = KdTree<float, Dim>;
+
+  BestBinFirst<Tree> search_;
+  std::vector<const Tree*> trees_;
   std::vector<const float*> queries_;
   std::vector<float> row_;
   std::vector<float> turned_;

@@ -10,6 +10,7 @@
 /// for (const auto& [id, distance] : tree.nearest(query, 10)) use(id, distance);
 /// for (const auto& [id, distance] : tree.within(query, 0.5F)) use(id, distance);
 /// tree.search(query, my_collector);
+/// tree.search(query, my_collector, {.budget = {.leaves = 24}});  // not more than 24 leaves
 /// ```
 ///
 /// Up to eight dimensions exact search runs over nodes of sixteen boxes (box_tree.hpp); above, over single
@@ -32,12 +33,15 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/index/best_bin_first.hpp>
 #include <cairn/index/collectors.hpp>
+#include <cairn/index/detail/answers.hpp>
 #include <cairn/index/detail/box_tree.hpp>
 #include <cairn/index/detail/kd_builder.hpp>
 #include <cairn/index/detail/kd_layout.hpp>
 #include <cairn/index/detail/leaf_blocks.hpp>
 #include <cairn/index/detail/point_ids.hpp>
+#include <cairn/index/detail/tree_access.hpp>
 #include <cairn/index/metric.hpp>
 #include <cairn/index/points.hpp>
 
@@ -57,6 +61,7 @@ public:
   using Hit = Neighbor<Real>;
   using Coordinate = Scalar;
   using Measure = M;
+  using Scratch = BestBinFirst<KdTree>;  ///< what a search under a budget needs
   static constexpr std::size_t fixed_dimension = Dim;
   static_assert(detail::is_coordinate<Scalar>,
                 "coordinates are kept as float, double or whole numbers of up to four bytes");
@@ -92,15 +97,6 @@ public:
     return KdTree(std::move(rows), ids, dim, std::move(metric), options.threads);
   }
 
-  /// For indices made of trees: a tree of what a builder made.
-  [[nodiscard]] static KdTree from_parts(detail::KdParts<Scalar> parts, std::size_t dim, M metric) {
-    KdTree tree;
-    tree.metric_ = std::move(metric);
-    tree.dim_ = dim;
-    tree.parts_ = std::move(parts);
-    return tree;
-  }
-
   [[nodiscard]] std::size_t size() const noexcept { return parts_.layout.points(); }
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
   [[nodiscard]] std::size_t dimension() const noexcept { return Dim != dynamic_dim ? Dim : dim_; }
@@ -116,10 +112,13 @@ public:
   /// The nearest point; nothing where the tree is empty.
   template <Point Query>
   [[nodiscard]] std::optional<Hit> nearest(const Query& query) const {
-    Nearest<Real> collector;
-    search(query, collector);
-    if (collector.id() == no_point) return std::nullopt;
-    return Hit{collector.id(), metric_.restore(collector.reduced())};
+    return detail::nearest_of<Real>(metric_, [&](auto& collector) { search(query, collector); });
+  }
+  /// The nearest of those that a search under a budget meets.
+  template <Point Query>
+  [[nodiscard]] std::optional<Hit> nearest(const Query& query, Budget budget) const {
+    return detail::nearest_of<Real>(metric_,
+                                    [&](auto& collector) { search(query, collector, {.budget = budget}); });
   }
 
   /// The k nearest points, nearest first; all of them where there are fewer. O(k) for each point kept.
@@ -129,46 +128,52 @@ public:
     found.resize(nearest(query, std::span<Hit>(found)));
     return found;
   }
+  template <Point Query>
+  [[nodiscard]] std::vector<Hit> nearest(const Query& query, std::size_t k, Budget budget) const {
+    return detail::k_nearest_of<Real>(k, size(), metric_,
+                                      [&](auto& collector) { search(query, collector, {.budget = budget}); });
+  }
 
   /// Writes the nearest points, nearest first, as many as `found` has room for; returns how many.
   template <Point Query>
   std::size_t nearest(const Query& query, std::span<Hit> found) const {
-    if (found.empty()) return 0;
-    KNearest<Real> collector(found.data(), found.size());
-    search(query, collector);
-    collector.restore(metric_);
-    return collector.size();
+    return detail::nearest_into(found, metric_, [&](auto& collector) { search(query, collector); });
   }
 
   /// All points at most `radius` away, nearest first. radius >= 0.
   template <Point Query>
   [[nodiscard]] std::vector<Hit> within(const Query& query, Real radius) const {
     CAIRN_EXPECTS(radius >= 0, "KdTree::within: a radius is not negative");
-    std::vector<Hit> found;
-    Within<Real> collector(found, detail::largest_reduced(metric_, radius));
-    search(query, collector);
-    for (Hit& hit : found) hit.distance = metric_.restore(hit.distance);
-    std::sort(found.begin(), found.end(), nearer<Real>);
-    return found;
+    return detail::all_within(radius, metric_, [&](auto& collector) { search(query, collector); });
   }
 
   /// Shows a collector every point nearer than its limit (and perhaps others), near ones early. Adds to
-  /// `work` what was done. Throws Error where a coordinate of the query is not finite.
+  /// `work` what was done. Throws Error where a coordinate of the query is not finite. Returns true: nothing
+  /// is left out.
   template <Point Query, Collector<Real> C>
-  void search(const Query& query, C& collector, Work* work = nullptr) const {
+  bool search(const Query& query, C& collector, Work* work = nullptr) const {
     detail::check_collector<C, M>();
-    if (empty()) return;
+    if (empty()) return true;
     detail::Scratch<Real> row(dimension());
     detail::copy_point<Real>(query, dimension(), row.data(), {"KdTree: query", 0});
     detail::wrap_row(metric_, dimension(), row.data());
     Work done;
-    if (use_boxes())
-      detail::with_widest_lanes([&]() CAIRN_INLINED {
-        parts_.boxes.search(parts_.blocks, row.data(), dimension(), metric_, collector, done);
-      });
-    else
-      search_splits(row.data(), collector, done);
+    search_row(row.data(), collector, done);
     if (work != nullptr) *work += done;
+    return true;
+  }
+
+  /// The same where there is no budget; under one as BestBinFirst, whose queue `scratch` keeps from search to
+  /// search. Returns true where nothing nearer was left out.
+  template <Point Query, Collector<Real> C>
+  bool search(const Query& query, C& collector, const SearchOptions& options, Scratch& scratch) const {
+    if (options.budget.unlimited()) return search(query, collector, options.work);
+    return scratch.search(*this, query, collector, options.budget, options.work);
+  }
+  template <Point Query, Collector<Real> C>
+  bool search(const Query& query, C& collector, const SearchOptions& options) const {
+    Scratch scratch;
+    return search(query, collector, options, scratch);
   }
 
   /// Calls visit(id, std::span<const Scalar>) for every point, in leaf order.
@@ -177,25 +182,9 @@ public:
     parts_.blocks.for_each({0, leaves()}, visit);
   }
 
-  /// For searches of other headers: the shape, the splits, the boxes (up to eight dimensions), and one leaf's
-  /// points offered to a collector.
-  [[nodiscard]] const detail::KdLayout& layout() const noexcept { return parts_.layout; }
-  [[nodiscard]] const detail::Split<Scalar>& split(unsigned depth, std::size_t slot) const noexcept {
-    return parts_.splits[detail::KdLayout::split_at(depth, slot)];
-  }
-  [[nodiscard]] const detail::LeafBlocks<Scalar>& blocks() const noexcept { return parts_.blocks; }
-  using Boxes = detail::BoxTree<Scalar>;
-  [[nodiscard]] const Boxes& boxes() const noexcept { return parts_.boxes; }
-  void prefetch_leaf(std::size_t leaf) const noexcept { parts_.blocks.prefetch(leaf, dimension()); }
-  template <Collector<Real> C>
-  void scan_leaf(std::size_t leaf, const Real* query, C& collector, Work& work) const {
-    ++work.leaves;
-    work.distances += detail::block_size;
-    detail::with_widest_lanes(
-        [&]() CAIRN_INLINED { parts_.blocks.scan(leaf, query, dimension(), metric_, collector); });
-  }
-
 private:
+  friend struct detail::TreeAccess;
+
   /// The caller's ids, one for each of `count` points.
   static std::span<const PointId> checked(std::span<const PointId> ids, std::size_t count) {
     CAIRN_EXPECTS(ids.size() == count, "KdTree: there must be one id a point");
@@ -218,6 +207,31 @@ private:
 
   [[nodiscard]] bool use_boxes() const noexcept { return dimension() <= detail::few_axes; }
 
+  /// Exact search for checked numbers.
+  template <class C>
+  void search_row(const Real* row, C& collector, Work& work) const {
+    if constexpr (Dim != dynamic_dim && Dim <= detail::few_axes)
+      search_boxes(row, collector, work);
+    else if (Dim == dynamic_dim && use_boxes())
+      search_boxes(row, collector, work);
+    else
+      search_splits(row, collector, work);
+  }
+  template <class C>
+  void search_boxes(const Real* row, C& collector, Work& work) const {
+    detail::with_widest_lanes([&]() CAIRN_INLINED {
+      parts_.boxes.search(parts_.blocks, row, dimension(), metric_, collector, work);
+    });
+  }
+
+  template <class C>
+  void scan_leaf(std::size_t leaf, const Real* query, C& collector, Work& work) const {
+    ++work.leaves;
+    work.distances += detail::block_size;
+    detail::with_widest_lanes(
+        [&]() CAIRN_INLINED { parts_.blocks.scan(leaf, query, dimension(), metric_, collector); });
+  }
+
   /// Depth first over single splits; `offsets` holds the distance to the current cell along each axis.
   template <class C>
   void search_splits(const Real* query, C& collector, Work& work) const {
@@ -232,7 +246,7 @@ private:
     const detail::Range leaves = parts_.layout.leaves_below(depth, slot);
     if (leaves.size() == 1) return scan_leaf(leaves.begin, query, collector, work);
     ++work.nodes;
-    const detail::Split<Scalar>& here = split(depth, slot);
+    const detail::Split<Scalar>& here = parts_.splits[detail::KdLayout::split_at(depth, slot)];
     const Real offset = query[here.axis] - static_cast<Real>(here.value);
     const std::size_t near = 2 * slot + (offset < 0 ? 0 : 1);
     descend(depth + 1, near, bound, query, offsets, collector, work);
@@ -250,6 +264,15 @@ private:
   std::size_t dim_ = 0;
   detail::KdParts<Scalar> parts_;
 };
+
+namespace detail {
+
+template <class Tree>
+inline constexpr bool is_kd_tree = false;
+template <class Scalar, std::size_t Dim, class M>
+inline constexpr bool is_kd_tree<KdTree<Scalar, Dim, M>> = true;
+
+}  // namespace detail
 
 /// Without arguments in <> a tree keeps coordinates as the points have them: doubles stay doubles.
 template <PointSet Points, class M = L2>

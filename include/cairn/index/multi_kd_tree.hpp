@@ -17,8 +17,9 @@
 /// cairn::MultiKdTree<float, 3> map;
 /// const cairn::PointId first = map.insert(points);           // numbered first, first + 1, ...
 /// map.erase(first);                                          // found by nothing from here on
-/// cairn::BestBinFirst<cairn::MultiKdTree<float, 3>> search;  // under a budget; keep one for many searches
-/// search.search(map, query, collector, {.leaves = 24});
+/// const auto hits = map.nearest(query, 10);                  // within(query, radius): as of a KdTree
+/// decltype(map)::Scratch scratch;                            // under a budget; keep one for many searches
+/// map.search(query, collector, {.budget = {.leaves = 24}}, scratch);
 /// for (const cairn::PointId id : cairn::inside(map, low, high)) use(id);  // and NearestFirst(map, query)
 /// ```
 ///
@@ -38,6 +39,7 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/index/detail/answers.hpp>
 #include <cairn/index/detail/forest_queries.hpp>
 #include <cairn/index/detail/lockstep_search.hpp>
 #include <cairn/index/detail/logarithmic_forest.hpp>
@@ -63,6 +65,10 @@ public:
   using Tree = KdTree<Scalar, Dim, M>;
   using Real = typename Tree::Real;
   using Hit = typename Tree::Hit;
+  using Coordinate = Scalar;
+  using Measure = M;
+  using Scratch = BestBinFirst<MultiKdTree>;  ///< what a search under a budget needs
+  static constexpr std::size_t fixed_dimension = Dim;
 
   /// An empty index; with dynamic_dim the first point inserted fixes the dimension.
   explicit MultiKdTree(MultiTreeShape shape = {}, M metric = {})
@@ -153,44 +159,69 @@ public:
   /// Ends all merges under way.
   void finish_merges() { forest_.finish_merges(); }
 
+  /// The nearest point; nothing where there is none.
   template <Point Query>
   [[nodiscard]] std::optional<Hit> nearest(const Query& query) const {
-    Nearest<Real> collector;
-    search(query, collector);
-    if (collector.id() == no_point) return std::nullopt;
-    return Hit{collector.id(), metric_.restore(collector.reduced())};
+    return detail::nearest_of<Real>(metric_, [&](auto& collector) { search(query, collector); });
+  }
+  /// The nearest of those that a search under a budget meets.
+  template <Point Query>
+  [[nodiscard]] std::optional<Hit> nearest(const Query& query, Budget budget) const {
+    return detail::nearest_of<Real>(metric_,
+                                    [&](auto& collector) { search(query, collector, {.budget = budget}); });
   }
 
   /// The k nearest points, nearest first; all of them where there are fewer.
   template <Point Query>
   [[nodiscard]] std::vector<Hit> nearest(const Query& query, std::size_t k) const {
-    std::vector<Hit> found(std::min(k, size()));
-    if (found.empty()) return found;
-    KNearest<Real> collector(found.data(), found.size());
-    search(query, collector);
-    collector.restore(metric_);
-    return found;
+    return detail::k_nearest_of<Real>(k, size(), metric_, [&](auto& collector) { search(query, collector); });
+  }
+  template <Point Query>
+  [[nodiscard]] std::vector<Hit> nearest(const Query& query, std::size_t k, Budget budget) const {
+    return detail::k_nearest_of<Real>(k, size(), metric_,
+                                      [&](auto& collector) { search(query, collector, {.budget = budget}); });
+  }
+
+  /// Writes the nearest points, nearest first, as many as `found` has room for; returns how many.
+  template <Point Query>
+  std::size_t nearest(const Query& query, std::span<Hit> found) const {
+    return detail::nearest_into(found, metric_, [&](auto& collector) { search(query, collector); });
   }
 
   /// All points at most `radius` away, nearest first. radius >= 0.
   template <Point Query>
   [[nodiscard]] std::vector<Hit> within(const Query& query, Real radius) const {
     CAIRN_EXPECTS(radius >= 0, "MultiKdTree::within: a radius is not negative");
-    std::vector<Hit> found;
-    Within<Real> collector(found, detail::largest_reduced(metric_, radius));
-    search(query, collector);
-    for (Hit& hit : found) hit.distance = metric_.restore(hit.distance);
-    std::sort(found.begin(), found.end(), nearer<Real>);
-    return found;
+    return detail::all_within(radius, metric_, [&](auto& collector) { search(query, collector); });
   }
 
-  /// Exact search through all trees, the largest first, with one collector and so one bound.
+  /// Exact search through all trees, the largest first, with one collector and so one bound. Returns true:
+  /// nothing is left out.
   template <Point Query, Collector<Real> C>
-  void search(const Query& query, C& collector, Work* work = nullptr) const {
+  bool search(const Query& query, C& collector, Work* work = nullptr) const {
     detail::check_collector<C, M>();
-    if (live_ == forest_.stored()) return search_trees(query, collector, work);
-    detail::OnlyLive<Real, C> only_live{&state_, &collector};
-    search_trees(query, only_live, work);
+    if (forest_.trees().empty()) return true;
+    detail::Scratch<Real> row(dimension());
+    detail::copy_point<Real>(query, dimension(), row.data(), {"MultiKdTree: query", 0});
+    detail::wrap_row(metric_, dimension(), row.data());
+    Work done;
+    auto only_live = detail::ForestAccess::only_live(*this, collector);
+    search_row(row.data(), only_live, done);
+    if (work != nullptr) *work += done;
+    return true;
+  }
+
+  /// The same where there is no budget; under one as BestBinFirst, whose queue `scratch` keeps from search to
+  /// search. Returns true where nothing nearer was left out.
+  template <Point Query, Collector<Real> C>
+  bool search(const Query& query, C& collector, const SearchOptions& options, Scratch& scratch) const {
+    if (options.budget.unlimited()) return search(query, collector, options.work);
+    return scratch.search(*this, query, collector, options.budget, options.work);
+  }
+  template <Point Query, Collector<Real> C>
+  bool search(const Query& query, C& collector, const SearchOptions& options) const {
+    Scratch scratch;
+    return search(query, collector, options, scratch);
   }
 
   /// Calls visit(id, std::span<const Scalar>) for every point that is not erased, tree by tree.
@@ -207,20 +238,17 @@ private:
   static_assert(sizeof(PointState) == 1);
   friend struct detail::ForestAccess;
 
-  template <Point Query, class C>
-  void search_trees(const Query& query, C& collector, Work* work) const {
+  /// Exact search for checked numbers.
+  template <class C>
+  void search_row(const Real* row, C& collector, Work& work) const {
     const std::span<const Tree* const> trees = forest_.trees();
-    if (trees.empty()) return;
-    detail::Scratch<Real> row(dimension());
-    detail::copy_point<Real>(query, dimension(), row.data(), {"MultiKdTree: query", 0});
-    detail::wrap_row(metric_, dimension(), row.data());
-    Work done;
-    if (dimension() <= detail::few_axes)
-      detail::search_in_step(trees, row.data(), collector, done);
+    if constexpr (Dim != dynamic_dim && Dim <= detail::few_axes)
+      detail::search_in_step(trees, row, collector, work);
+    else if (Dim == dynamic_dim && dimension() <= detail::few_axes)
+      detail::search_in_step(trees, row, collector, work);
     else
       for (std::size_t i = trees.size(); i-- > 0;)
-        trees[i]->search(std::span<const Real>(row.data(), dimension()), collector, &done);
-    if (work != nullptr) *work += done;
+        detail::TreeAccess::search_row(*trees[i], row, collector, work);
   }
 
   /// Marks the ids of an insertion; takes the marks back unless the insertion went through. The checks stand

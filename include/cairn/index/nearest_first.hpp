@@ -20,9 +20,41 @@
 #include <utility>
 #include <vector>
 
+#include <cairn/index/brute_force.hpp>
 #include <cairn/index/kd_tree.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
+
+namespace detail {
+
+/// Takes every point that it is offered; the nearest comes out first. Reduced distances.
+template <class Hit>
+class HitQueue {
+public:
+  using Real = decltype(Hit::distance);
+
+  [[nodiscard]] bool empty() const noexcept { return hits_.empty(); }
+  [[nodiscard]] const Hit& front() const noexcept { return hits_.front(); }
+  [[nodiscard]] Hit pop() {
+    std::pop_heap(hits_.begin(), hits_.end(), farther);
+    const Hit hit = hits_.back();
+    hits_.pop_back();
+    return hit;
+  }
+
+  /// What makes it a collector.
+  [[nodiscard]] Real limit() const noexcept { return std::numeric_limits<Real>::infinity(); }
+  void offer(PointId id, Real reduced) {
+    hits_.push_back({id, reduced});
+    std::push_heap(hits_.begin(), hits_.end(), farther);
+  }
+
+private:
+  static bool farther(const Hit& a, const Hit& b) noexcept { return nearer(b, a); }
+  std::vector<Hit> hits_;
+};
+
+}  // namespace detail
 
 /// Refers to the tree, which must live longer. The k-th call costs as much as it takes to be sure of the k-th
 /// nearest; memory grows with the leaves visited.
@@ -34,6 +66,7 @@ public:
 
   /// Throws Error where the query is not finite or of another dimension.
   template <Point Query>
+    requires detail::is_kd_tree<Tree>
   NearestFirst(const Tree& tree, const Query& query) : tree_(&tree), query_(tree.dimension()) {
     if (tree.empty()) return;
     detail::copy_point<Real>(query, query_.size(), query_.data(), {"NearestFirst: query", 0});
@@ -48,9 +81,7 @@ public:
     while (!cells_.empty() && (hits_.empty() || cells_.front().bound <= hits_.front().distance))
       open_nearest_cell();
     if (hits_.empty()) return std::nullopt;
-    std::pop_heap(hits_.begin(), hits_.end(), farther_hit);
-    const Hit hit = hits_.back();
-    hits_.pop_back();
+    const Hit hit = hits_.pop();
     return Hit{hit.id, tree_->metric().restore(hit.distance)};
   }
 
@@ -66,31 +97,20 @@ private:
     std::size_t slot;
     std::vector<Offset> offsets;
   };
-  /// Takes every point of a leaf.
-  struct Everything {
-    std::vector<Hit>* hits;
-    [[nodiscard]] Real limit() const noexcept { return std::numeric_limits<Real>::infinity(); }
-    void offer(PointId id, Real reduced) {
-      hits->push_back({id, reduced});
-      std::push_heap(hits->begin(), hits->end(), farther_hit);
-    }
-  };
 
   static bool farther_cell(const Cell& a, const Cell& b) noexcept { return a.bound > b.bound; }
-  static bool farther_hit(const Hit& a, const Hit& b) noexcept { return nearer(b, a); }
 
   void open_nearest_cell() {
     std::pop_heap(cells_.begin(), cells_.end(), farther_cell);
     Cell cell = std::move(cells_.back());
     cells_.pop_back();
     for (;; ++cell.depth) {
-      const detail::Range leaves = tree_->layout().leaves_below(cell.depth, cell.slot);
+      const detail::Range leaves = detail::TreeAccess::layout(*tree_).leaves_below(cell.depth, cell.slot);
       if (leaves.size() == 1) {
-        Everything everything{&hits_};
         Work work;
-        return tree_->scan_leaf(leaves.begin, query_.data(), everything, work);
+        return detail::TreeAccess::scan_leaf(*tree_, leaves.begin, query_.data(), hits_, work);
       }
-      const auto& split = tree_->split(cell.depth, cell.slot);
+      const auto& split = detail::TreeAccess::split(*tree_, cell.depth, cell.slot);
       const Real offset = query_[split.axis] - static_cast<Real>(split.value);
       const std::size_t near = 2 * cell.slot + (offset < 0 ? 0 : 1);
       const Real across = detail::offset_across(tree_->metric(), query_[split.axis],
@@ -117,7 +137,33 @@ private:
   const Tree* tree_;
   std::vector<Real> query_;
   std::vector<Cell> cells_;
-  std::vector<Hit> hits_;  ///< reduced distances
+  detail::HitQueue<Hit> hits_;
+};
+template <class Tree, Point Query>
+NearestFirst(const Tree&, const Query&) -> NearestFirst<Tree>;
+
+/// The same of BruteForce: the first call costs O(n), each further one O(log n).
+template <class Scalar, std::size_t Dim, class M>
+class NearestFirst<BruteForce<Scalar, Dim, M>> {
+public:
+  using Index = BruteForce<Scalar, Dim, M>;
+  using Real = typename Index::Real;
+  using Hit = typename Index::Hit;
+
+  template <Point Query>
+  NearestFirst(const Index& index, const Query& query) : metric_(index.metric()) {
+    index.search(query, hits_);
+  }
+
+  std::optional<Hit> next() {
+    if (hits_.empty()) return std::nullopt;
+    const Hit hit = hits_.pop();
+    return Hit{hit.id, metric_.restore(hit.distance)};
+  }
+
+private:
+  [[no_unique_address]] M metric_;
+  detail::HitQueue<Hit> hits_;
 };
 
 }}  // namespace cairn::CAIRN_ABI

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: MIT
 //
 /// @file
-/// Saving a kd-tree and loading it again.
+/// Saving a kd-tree and loading it again (one that grows: multi_tree_file.hpp).
 ///
 ///   bytes 0-7    "cairnkd" and a zero
 ///   8-11         version of the format: 1           all numbers little-endian
@@ -87,37 +87,41 @@ std::vector<T> read_numbers(std::istream& in, std::uint64_t count, const std::st
   return numbers;
 }
 
-}  // namespace detail
-
-/// Writes the points and ids of a tree. Throws Error where the stream fails; open it in binary mode.
-template <class Scalar, std::size_t Dim, class M>
-void save_tree(std::ostream& out, const KdTree<Scalar, Dim, M>& tree) {
+/// Writes the points and ids of an index. Throws Error where the stream fails.
+template <class Index, class Scalar = typename Index::Coordinate>
+void write_points(std::ostream& out, const Index& index) {
   std::vector<PointId> ids;
   std::vector<Scalar> rows;
-  ids.reserve(tree.size());
-  rows.reserve(tree.size() * tree.dimension());
-  tree.for_each([&](PointId id, std::span<const Scalar> row) {
+  ids.reserve(index.size());
+  rows.reserve(index.size() * index.dimension());
+  index.for_each([&](PointId id, std::span<const Scalar> row) {
     ids.push_back(id);
     rows.insert(rows.end(), row.begin(), row.end());
   });
-  detail::TreeFileHeader header;
+  TreeFileHeader header;
   header.scalar_bytes = sizeof(Scalar);
-  header.dimension = tree.dimension();
-  header.points = tree.size();
-  header.checksum = detail::checksum_of(header, ids, rows);
+  header.dimension = index.dimension();
+  header.points = index.size();
+  header.checksum = checksum_of(header, ids, rows);
   out.write(reinterpret_cast<const char*>(&header), sizeof(header));
-  for (const std::span<const char> part : {detail::bytes_of(ids), detail::bytes_of(rows)})
+  for (const std::span<const char> part : {bytes_of(ids), bytes_of(rows)})
     out.write(part.data(), static_cast<std::streamsize>(part.size()));
   if (!out.flush()) raise("save_tree: the tree could not be written");
 }
 
-/// Reads a tree of the same kind, whose metric is not in the file. Throws Error, with `name` of the source,
-/// for what is no tree file, a newer version, another kind of coordinates or dimension, a truncated or
-/// damaged one, and for coordinates and ids that no tree can have.
-template <class Tree, class Scalar = typename Tree::Coordinate>
-[[nodiscard]] Tree load_tree(std::istream& in, const std::string& name, typename Tree::Measure metric = {}) {
-  const detail::TreeFileHeader expected;
-  detail::TreeFileHeader header;
+/// The points of a file: ids that a tree may have, and rows of `dim` checked numbers.
+template <class Scalar>
+struct PointsOfFile {
+  std::size_t dim;
+  std::vector<PointId> ids;
+  std::vector<Scalar> rows;
+};
+
+/// Reads them. Throws Error, with `name` of the source, for what is no tree file or a damaged one.
+template <class Scalar, std::size_t Dim>
+[[nodiscard]] PointsOfFile<Scalar> read_points(std::istream& in, const std::string& name) {
+  const TreeFileHeader expected;
+  TreeFileHeader header;
   if (!in.read(reinterpret_cast<char*>(&header), sizeof(header)) || header.magic != expected.magic)
     raise(name + ": not a cairn tree file");
   if (header.version != expected.version)
@@ -125,23 +129,40 @@ template <class Tree, class Scalar = typename Tree::Coordinate>
   if (header.scalar_bytes != sizeof(Scalar))
     raise(name + ": coordinates of " + std::to_string(header.scalar_bytes) + " bytes, expected " +
           std::to_string(sizeof(Scalar)));
-  const std::size_t dim = Tree::fixed_dimension;
-  if ((dim != dynamic_dim && header.dimension != dim) || header.dimension > (1U << 16))
+  if ((Dim != dynamic_dim && header.dimension != Dim) || header.dimension > (1U << 16))
     raise(name + ": dimension " + std::to_string(header.dimension) + ", expected " +
-          (dim != dynamic_dim ? std::to_string(dim) : "at most 65536"));
+          (Dim != dynamic_dim ? std::to_string(Dim) : "at most 65536"));
   if (header.points >= no_point) raise(name + ": " + std::to_string(header.points) + " points are too many");
   if (header.points > 0 && header.dimension == 0) raise(name + ": dimension 0, expected at least 1");
-  const auto ids = detail::read_numbers<PointId>(in, header.points, name);
-  auto rows = detail::read_numbers<Scalar>(in, header.points * header.dimension, name);
-  if (detail::checksum_of(header, ids, rows) != header.checksum)
+  PointsOfFile<Scalar> points{static_cast<std::size_t>(header.dimension), {}, {}};
+  points.ids = read_numbers<PointId>(in, header.points, name);
+  points.rows = read_numbers<Scalar>(in, header.points * header.dimension, name);
+  if (checksum_of(header, points.ids, points.rows) != header.checksum)
     raise(name + ": the checksum is wrong, the tree file is damaged");
-  if (const auto bad = detail::bad_id(ids))
-    raise(name + ": point " + std::to_string(*bad) + " has the id " + std::to_string(ids[*bad]) +
+  if (const auto bad = bad_id(points.ids))
+    raise(name + ": point " + std::to_string(*bad) + " has the id " + std::to_string(points.ids[*bad]) +
           ", expected one that no other point has and that is below 4294967295");
-  if (ids.empty()) return Tree();
-  const auto rows_dim = static_cast<std::size_t>(header.dimension);
-  detail::check_rows(rows, rows_dim, (name + ": point").c_str());
-  return Tree::from_rows(std::move(rows), rows_dim, ids, std::move(metric));
+  if (!points.ids.empty()) check_rows(points.rows, points.dim, (name + ": point").c_str());
+  return points;
+}
+
+}  // namespace detail
+
+/// Writes the points and ids of a tree. Throws Error where the stream fails; open it in binary mode.
+template <class Scalar, std::size_t Dim, class M>
+void save_tree(std::ostream& out, const KdTree<Scalar, Dim, M>& tree) {
+  detail::write_points(out, tree);
+}
+
+/// Reads a tree of the same kind, whose metric is not in the file. Throws Error, with `name` of the source,
+/// for what is no tree file, a newer version, another kind of coordinates or dimension, a truncated or
+/// damaged one, and for coordinates and ids that no tree can have.
+template <class Tree, class Scalar = typename Tree::Coordinate>
+  requires detail::is_kd_tree<Tree>
+[[nodiscard]] Tree load_tree(std::istream& in, const std::string& name, typename Tree::Measure metric = {}) {
+  auto points = detail::read_points<Scalar, Tree::fixed_dimension>(in, name);
+  if (points.ids.empty()) return Tree();
+  return Tree::from_rows(std::move(points.rows), points.dim, points.ids, std::move(metric));
 }
 
 }}  // namespace cairn::CAIRN_ABI

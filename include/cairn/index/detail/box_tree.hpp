@@ -59,10 +59,11 @@ public:
   [[nodiscard]] std::size_t bytes() const noexcept { return boxes_.capacity() * sizeof(Real); }
 
   /// How far a search has come: the children that wait at every level of its path, as keys, and the nearest
-  /// of the last level, whose memory has been asked for.
+  /// of the last level, whose memory has been asked for. Level w of the nodes is w + 1 here: above the root
+  /// stands a node whose only child it is.
   struct Walk {
-    Block<Bits> waiting[max_levels];
-    std::size_t node_of[max_levels];
+    Block<Bits> waiting[max_levels + 1];
+    std::size_t node_of[max_levels + 1];
     unsigned level;
     Bits next;
   };
@@ -70,34 +71,28 @@ public:
   /// Levels of nodes above the leaves.
   [[nodiscard]] unsigned levels() const noexcept { return levels_; }
 
-  /// Begins a search. `dim` is the tree's, given again so that it may be a constant.
-  template <class M, class C>
-  [[gnu::always_inline]] void enter(Walk& walk, const Real* query, std::size_t dim, const M& metric,
-                                    const C& collector, Work& work) const {
+  /// Begins a search, above the root.
+  [[gnu::always_inline]] void enter(Walk& walk) const {
     walk.level = 0;
     walk.node_of[0] = 0;
-    if (levels_ > 0) {
-      bound_children(0, 0, query, dim, metric, collector, walk.waiting[0], work);
-      walk.next = smallest<Bits>(walk.waiting[0]);
-    } else {
-      walk.waiting[0] = Block<Bits>{} + none;
-      walk.next = layout_.leaves() > 0 ? Bits{0} : none;
-    }
+    walk.waiting[0] = Block<Bits>{} + none;
+    walk.next = layout_.leaves() > 0 ? Bits{0} : none;
   }
 
   /// Visits the node or leaf that is next, if it may hold something near enough; false where none does. What
   /// comes after it is asked for from memory: a leaf before this one is scanned, a node to be visited later.
+  /// `dim` is the tree's, given again so that it may be a constant.
   template <class M, class C>
   [[gnu::always_inline]] bool advance(Walk& walk, const LeafBlocks<Scalar>& blocks, const Real* query,
                                       std::size_t dim, const M& metric, C& collector, Work& work) const {
     while (!(bound_of(walk.next) < static_cast<Real>(collector.limit()))) {
-      if (walk.level == 0) return false;
+      if (walk.level <= 1) return false;
       walk.next = smallest<Bits>(walk.waiting[--walk.level]);
     }
     const auto lane = static_cast<std::size_t>(walk.next & 15);
     walk.waiting[walk.level][lane] = none;
     const std::size_t child = child_at(walk, lane);
-    if (walk.level + 1 >= levels_) {
+    if (walk.level >= levels_) {
       walk.next = smallest<Bits>(walk.waiting[walk.level]);
       if (bound_of(walk.next) < static_cast<Real>(collector.limit()))
         blocks.prefetch(leaf_of(child_at(walk, static_cast<std::size_t>(walk.next & 15))), dim);
@@ -105,7 +100,7 @@ public:
       return true;
     }
     walk.node_of[++walk.level] = child;
-    bound_children(walk.level, child, query, dim, metric, collector, walk.waiting[walk.level], work);
+    bound_children(walk.level - 1, child, query, dim, metric, collector, walk.waiting[walk.level], work);
     walk.next = smallest<Bits>(walk.waiting[walk.level]);
     return true;
   }
@@ -115,8 +110,8 @@ public:
                                        std::size_t dim) const noexcept {
     if (walk.next == none) return;
     const std::size_t child = child_at(walk, static_cast<std::size_t>(walk.next & 15));
-    if (walk.level + 1 >= levels_) return blocks.prefetch(leaf_of(child), dim);
-    const auto* bytes = reinterpret_cast<const char*>(boxes_.data() + (first_node_[walk.level + 1] + child) *
+    if (walk.level >= levels_) return blocks.prefetch(leaf_of(child), dim);
+    const auto* bytes = reinterpret_cast<const char*>(boxes_.data() + (first_node_[walk.level] + child) *
                                                                           (2 * dim * block_size));
     for (std::size_t at = 0; at < 2 * dim * block_size * sizeof(Real); at += 64)
       __builtin_prefetch(bytes + at);
@@ -127,7 +122,7 @@ public:
   [[gnu::always_inline]] void search(const LeafBlocks<Scalar>& blocks, const Real* query, std::size_t dim,
                                      const M& metric, C& collector, Work& work) const {
     Walk walk;
-    enter(walk, query, dim, metric, collector, work);
+    enter(walk);
     while (advance(walk, blocks, query, dim, metric, collector, work)) {
     }
   }
@@ -154,7 +149,7 @@ private:
 
   /// Number, within its level, of the child in a lane of the node where a search stands.
   [[gnu::always_inline]] std::size_t child_at(const Walk& walk, std::size_t lane) const noexcept {
-    return (walk.node_of[walk.level] << fan_bits(walk.level)) + lane;
+    return (walk.node_of[walk.level] << (walk.level == 1 ? root_bits() : 4)) + lane;
   }
   [[nodiscard]] std::size_t leaf_of(std::size_t child) const noexcept {
     return layout_.first_leaf(layout_.depth(), child);

@@ -26,6 +26,23 @@ class MultiKdTree;  // multi_kd_tree.hpp
 
 namespace detail {
 
+template <class Index>
+inline constexpr bool is_multi_kd_tree = false;
+template <class Scalar, std::size_t Dim, class M>
+inline constexpr bool is_multi_kd_tree<MultiKdTree<Scalar, Dim, M>> = true;
+
+/// Passes on to a collector what is not erased; everything where `state` is null, so that a search is
+/// compiled once for both.
+template <class Real, class C>
+struct OnlyLive {
+  const PointState* state;
+  C* collector;
+  [[nodiscard]] Real limit() const { return static_cast<Real>(collector->limit()); }
+  void offer(PointId id, Real reduced) {
+    if (state == nullptr || state[id] == PointState::live) collector->offer(id, reduced);
+  }
+};
+
 /// For searches of other headers: the trees of a multi-kd-tree, which hold erased points too, and who is not.
 struct ForestAccess {
   template <class Index>
@@ -36,20 +53,19 @@ struct ForestAccess {
   [[nodiscard]] static bool all_live(const Index& index) noexcept {
     return index.live_ == index.forest_.stored();
   }
+  /// A collector's view of what is not erased.
+  template <class Index, class C>
+  [[nodiscard]] static auto only_live(const Index& index, C& collector) noexcept {
+    return OnlyLive<typename Index::Real, C>{all_live(index) ? nullptr : states(index).data(), &collector};
+  }
   template <class Index>
   [[nodiscard]] static const std::vector<PointState>& states(const Index& index) noexcept {
     return index.state_;
   }
-};
-
-/// Passes on to a collector what is not erased.
-template <class Real, class C>
-struct OnlyLive {
-  const std::vector<PointState>* state;
-  C* collector;
-  [[nodiscard]] Real limit() const { return static_cast<Real>(collector->limit()); }
-  void offer(PointId id, Real reduced) {
-    if ((*state)[id] == PointState::live) collector->offer(id, reduced);
+  /// After loading: which ids were given. Those that the index holds must be live in `states` too.
+  template <class Index>
+  static void set_states(Index& index, std::vector<PointState> states) noexcept {
+    index.state_ = std::move(states);
   }
 };
 
@@ -75,9 +91,7 @@ public:
     row_.resize(index.dimension());
     detail::copy_point<Real>(query, row_.size(), row_.data(), {"BestBinFirst: query", 0});
     const auto trees = detail::ForestAccess::trees(index);
-    if (detail::ForestAccess::all_live(index))
-      return search_.search(trees, row_.data(), collector, budget, work);
-    detail::OnlyLive<Real, C> only_live{&detail::ForestAccess::states(index), &collector};
+    auto only_live = detail::ForestAccess::only_live(index, collector);
     return search_.search(trees, row_.data(), only_live, budget, work);
   }
 

@@ -32,28 +32,28 @@ public:
   [[gnu::always_inline]] void search(const Real* query, std::size_t dim, const M& metric, C& collector,
                                      Work& work) {
     unsigned deepest = 0;
-    for (const Tree* tree : trees_) deepest = std::max(deepest, tree->boxes().levels());
-    for (unsigned round = 0; round <= deepest; ++round)
+    for (const Tree* tree : trees_) deepest = std::max(deepest, TreeAccess::boxes(*tree).levels());
+    // Round by round one move of each tree, then each to its end. One call of advance() for both: it is
+    // inlined, for every width of vectors and every collector.
+    for (unsigned round = 0; round <= deepest + 1; ++round)
       for (std::size_t i = trees_.size(); i-- > 0;) {
-        const auto& boxes = trees_[i]->boxes();
-        const auto& blocks = trees_[i]->blocks();
+        const auto& boxes = TreeAccess::boxes(*trees_[i]);
+        const auto& blocks = TreeAccess::blocks(*trees_[i]);
         const unsigned levels = boxes.levels();
         if (round + levels < deepest) continue;
-        if (round + levels == deepest)
-          boxes.enter(walks_[i], query, dim, metric, collector, work);
-        else
-          boxes.advance(walks_[i], blocks, query, dim, metric, collector, work);
-        if (round < deepest) boxes.prefetch(walks_[i], blocks, dim);
-      }
-    for (std::size_t i = trees_.size(); i-- > 0;)
-      while (
-          trees_[i]->boxes().advance(walks_[i], trees_[i]->blocks(), query, dim, metric, collector, work)) {
+        if (round + levels == deepest) {
+          boxes.enter(walks_[i]);
+          if (levels == 0) continue;  // a leaf comes after the larger trees' first
+        }
+        while (boxes.advance(walks_[i], blocks, query, dim, metric, collector, work))
+          if (round <= deepest) break;
+        if (round < deepest && trees_.size() > 1) boxes.prefetch(walks_[i], blocks, dim);
       }
   }
 
 private:
   std::span<const Tree* const> trees_;
-  std::array<typename Tree::Boxes::Walk, most> walks_;
+  std::array<typename BoxTree<typename Tree::Coordinate>::Walk, most> walks_;
 };
 
 /// Offers the points of all trees, which are smallest first, to a collector. `query` holds checked numbers.
@@ -64,12 +64,8 @@ void search_in_step(std::span<const Tree* const> trees, const typename Tree::Rea
     for (auto rest = trees; !rest.empty();) {
       const std::size_t count = std::min(rest.size(), WalksInStep<Tree>::most);
       const Tree& any = *rest.back();
-      if (count == 1) {
-        any.boxes().search(any.blocks(), query, any.dimension(), any.metric(), collector, work);
-      } else {
-        WalksInStep<Tree> walks(rest.last(count));
-        walks.search(query, any.dimension(), any.metric(), collector, work);
-      }
+      WalksInStep<Tree> walks(rest.last(count));
+      walks.search(query, any.dimension(), any.metric(), collector, work);
       rest = rest.first(rest.size() - count);
     }
   });

@@ -56,6 +56,12 @@ template <class Scalar>
   }
 }
 
+/// The same for the widest vectors at hand, compiled once for all who count.
+template <class Scalar>
+void count_ranks_widely(const Scalar* keys, std::size_t count, RankOf<Scalar>* ranks) noexcept {
+  with_widest_lanes([=]() CAIRN_INLINED { count_ranks(keys, count, ranks); });
+}
+
 /// select_rank() of up to few_keys records, without a branch on their keys.
 template <class Record, class Key>
 void select_rank_of_few(Record* begin, Record* middle, Record* end, Key key) {
@@ -69,7 +75,7 @@ void select_rank_of_few(Record* begin, Record* middle, Record* end, Key key) {
     records[i] = begin[i];
     keys[i] = key(begin[i]);
   }
-  with_widest_lanes([&]() CAIRN_INLINED { count_ranks(keys, count, ranks); });
+  count_ranks_widely(keys, count, ranks);
   Record* below = begin;
   Record* above = middle + 1;
   for (std::size_t i = 0; i < count; ++i) {
@@ -123,7 +129,7 @@ auto sampled_pivot(const Record* begin, std::size_t count, std::size_t wanted, K
   const double aim = std::clamp(expected + (early ? margin : -margin), 0.0, static_cast<double>(size - 1));
   const auto rank = static_cast<RankOf<Scalar>>(aim);
   RankOf<Scalar> ranks[few_keys];
-  with_widest_lanes([&]() CAIRN_INLINED { count_ranks(sample, size, ranks); });
+  count_ranks_widely(sample, size, ranks);
   return sample[std::find(ranks, ranks + size - 1, rank) - ranks];
 }
 

@@ -65,7 +65,8 @@ public:
   [[nodiscard]] std::shared_ptr<const Tree> finish() {
     advance(std::numeric_limits<std::uint64_t>::max());
     const Tree& any = *task_.sources.front();
-    return std::make_shared<const Tree>(Tree::from_parts(builder_.finish(), any.dimension(), any.metric()));
+    return std::make_shared<const Tree>(
+        TreeAccess::from_parts<Tree>(builder_.finish(), any.dimension(), any.metric()));
   }
 
 private:
@@ -76,7 +77,7 @@ private:
     const Tree& source = *task_.sources[source_];
     const Range leaves{leaf_, std::min(leaf_ + leaves_in_piece, source.leaves())};
     std::uint64_t points = 0;
-    source.blocks().for_each(leaves, [&](PointId id, auto row) {
+    TreeAccess::blocks(source).for_each(leaves, [&](PointId id, auto row) {
       ++points;
       if (task_.states.empty() || task_.states[id] != PointState::erased) builder_.add(id, row.data());
     });
