@@ -278,8 +278,8 @@ struct InformationFilter {
   /// point of linearisation follows the estimate. Refused: a singular F, a Q that is no covariance.
   template <class F, class U = typename F::Control>
     requires(LinearisedProcess<F> || detail::explain_sizes<F>)
-  Status predict(InformationBelief<typename F::State>& belief, const F& process, const U& control,
-                 double dt) const {
+  Status predict(InformationBelief<typename F::State>& belief, const F& process, double dt,
+                 const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
@@ -308,11 +308,6 @@ struct InformationFilter {
     next.point = plain.propagate(next.point, dt);
     if (plain.misfit()) return Status::size_mismatch;
     return keep(belief, next);
-  }
-  template <class F>
-    requires(LinearisedProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
-  Status predict(InformationBelief<typename F::State>& belief, const F& process, double dt) const {
-    return predict(belief, process, NoControl{}, dt);
   }
 
   /// Adds the information of the measurement z, linearised at the belief's point. O(M^2 N + M N^2).

@@ -98,8 +98,8 @@ struct Interacting {
   /// `switching` that do not sum to 1 (bad_option), probabilities that are none (see ModeBelief::weighed).
   template <Manifold X, class... F, class U = typename std::tuple_element_t<0, std::tuple<F...>>::Control>
     requires(sizeof...(F) == R)
-  Status predict(ModeBelief<X, R>& belief, const std::tuple<F...>& processes, const U& control,
-                 double dt) const {
+  Status predict(ModeBelief<X, R>& belief, const std::tuple<F...>& processes, double dt,
+                 const U& control = detail::no_control<U>()) const {
     if (!stochastic()) return Status::bad_option;
     if (!belief.fits()) return Status::size_mismatch;
     if (const Status status = belief.weighed(); status != Status::accepted) return status;
@@ -117,7 +117,7 @@ struct Interacting {
     [&]<std::size_t... J>(std::index_sequence<J...>) {
       ((status = status != Status::accepted
                      ? status
-                     : filter.predict(next.modes[J], std::get<J>(processes), control, dt)),
+                     : filter.predict(next.modes[J], std::get<J>(processes), dt, control)),
        ...);
     }(std::make_index_sequence<R>{});
     double sum = 0.0;

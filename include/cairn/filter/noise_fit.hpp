@@ -139,7 +139,7 @@ Status smooth_record(const Filter& filter, const NoiseRecord<F, H>& record,
   log_likelihood = 0.0;
   Status status = see(record.first);
   for (const auto& step : record.steps) {
-    if (status == Status::accepted) status = recorder.predict(process, step.control, step.dt);
+    if (status == Status::accepted) status = recorder.predict(process, step.dt, step.control);
     if (status == Status::accepted) status = see(step.z);
     if (status != Status::accepted) return status;
   }

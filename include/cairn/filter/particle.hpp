@@ -273,8 +273,8 @@ struct ParticleFilter {
   /// Moves every particle and draws its noise.
   template <class F, class U = typename F::Control>
     requires(ProcessModel<F> || detail::explain_sizes<F>)
-  Status predict(Particles<typename F::State>& belief, const F& process, const U& control, double dt,
-                 Random& random) const {
+  Status predict(Particles<typename F::State>& belief, const F& process, double dt, Random& random,
+                 const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
     if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
     if (belief.states.empty()) return Status::depleted;

@@ -183,17 +183,12 @@ public:
 
   template <class F, class U = typename F::Control>
     requires(ProcessModel<F> || detail::explain_sizes<F>)
-  Status predict(const F& process, const U& control, double dt) {
+  Status predict(const F& process, double dt, const U& control = detail::no_control<U>()) {
     const Gaussian<X> before = belief_;
-    const Status status = filter_.predict(belief_, process, control, dt);
+    const Status status = filter_.predict(belief_, process, dt, control);
     if (status == Status::accepted)
       steps_.push_back(detail::record_step(filter_, before, belief_, process, control, dt));
     return status;
-  }
-  template <class F>
-    requires(ProcessModel<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
-  Status predict(const F& process, double dt) {
-    return predict(process, NoControl{}, dt);
   }
 
   template <class H, class V = typename H::Measurement>

@@ -104,8 +104,8 @@ struct SquareRoot {
 
   template <class F, class U = typename F::Control>
     requires(LinearisedProcess<F> || detail::explain_sizes<F>)
-  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, const U& control,
-                 double dt) const {
+  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, double dt,
+                 const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
     using std::sqrt;
@@ -127,11 +127,6 @@ struct SquareRoot {
     detail::put_transposed(array, size, 0, detail::semi_definite_root<n, S>(q));
     detail::triangularise(array);
     return detail::keep_root(belief, mean, array, size);
-  }
-  template <class F>
-    requires(LinearisedProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
-  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, double dt) const {
-    return predict(belief, process, NoControl{}, dt);
   }
 
   template <class H, class V = typename H::Measurement>
@@ -173,8 +168,8 @@ struct SquareRootUnscented {
 
   template <class F, class U = typename F::Control>
     requires(ProcessModel<F> || detail::explain_sizes<F>)
-  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, const U& control,
-                 double dt) const {
+  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, double dt,
+                 const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
     using std::sqrt;
@@ -199,11 +194,6 @@ struct SquareRootUnscented {
     detail::put_transposed(array, 2 * size + 1, 0, detail::semi_definite_root<n, S>(q));
     detail::triangularise(array);
     return detail::keep_root(belief, mean, array, size);
-  }
-  template <class F>
-    requires(ProcessModel<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
-  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, double dt) const {
-    return predict(belief, process, NoControl{}, dt);
   }
 
   template <class H, class V = typename H::Measurement>

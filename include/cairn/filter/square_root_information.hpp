@@ -100,8 +100,8 @@ struct SquareRootInformationFilter {
   /// is one. Refused: a singular F. O(n^3).
   template <class F, class U = typename F::Control>
     requires(LinearisedProcess<F> || detail::explain_sizes<F>)
-  Status predict(SquareRootInformation<typename F::State>& belief, const F& process, const U& control,
-                 double dt) const {
+  Status predict(SquareRootInformation<typename F::State>& belief, const F& process, double dt,
+                 const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
@@ -122,11 +122,6 @@ struct SquareRootInformationFilter {
     next.point = plain.propagate(next.point, dt);
     if (plain.misfit()) return Status::size_mismatch;
     return keep(belief, next);
-  }
-  template <class F>
-    requires(LinearisedProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
-  Status predict(SquareRootInformation<typename F::State>& belief, const F& process, double dt) const {
-    return predict(belief, process, NoControl{}, dt);
   }
 
   /// Adds the information of the measurement z, linearised at the belief's point. O((n + m) n^2).

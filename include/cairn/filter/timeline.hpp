@@ -59,7 +59,7 @@ public:
     if (given.misfit()) return Status::size_mismatch;
     if constexpr (requires { requires Control::SizeAtCompileTime == dynamic; }) {
       Gaussian<State> here = base_.after;  // what the process says of its size, before it is remembered
-      const Status status = filter_.predict(here, process_, given.value(), 0.0);
+      const Status status = filter_.predict(here, process_, 0.0, given.value());
       if (status == Status::size_mismatch) return status;
     }
     return insert(Event({time, given.value(), base_.after}, Steering{}));
@@ -139,7 +139,7 @@ private:
   /// Moves now.after from `since` to now.time. Events of one moment have no step between them.
   Status advance(Moment& now, double since) const {
     if (now.time == since) return Status::accepted;
-    return filter_.predict(now.after, process_, now.control, now.time - since);
+    return filter_.predict(now.after, process_, now.time - since, now.control);
   }
 
   Status insert(Event event) {

@@ -62,7 +62,8 @@ struct UDFilter {
 
   template <class F, class U = typename F::Control>
     requires(LinearisedProcess<F> || detail::explain_sizes<F>)
-  Status predict(UDGaussian<typename F::State>& belief, const F& process, const U& control, double dt) const {
+  Status predict(UDGaussian<typename F::State>& belief, const F& process, double dt,
+                 const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
@@ -90,11 +91,6 @@ struct UDFilter {
     belief.mean = mean;
     keep(belief, u, d);
     return Status::accepted;
-  }
-  template <class F>
-    requires(LinearisedProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
-  Status predict(UDGaussian<typename F::State>& belief, const F& process, double dt) const {
-    return predict(belief, process, NoControl{}, dt);
   }
 
   template <class H, class V = typename H::Measurement>
