@@ -298,7 +298,8 @@ struct ParticleFilter {
   /// Weighs every particle by the Gaussian likelihood of z, and resamples where the weights have degenerated.
   template <class H, class V = typename H::Measurement>
     requires(MeasurementModel<H> || detail::explain_sizes<H>)
-  Status update(Particles<typename H::State>& belief, const H& sensor, const V& z, Random& random) const {
+  UpdateResult update(Particles<typename H::State>& belief, const H& sensor, const V& z,
+                      Random& random) const {
     using S = ScalarOf<typename H::State>;
     constexpr int m = dof<typename H::Measurement>;
     if (belief.states.empty()) return Status::depleted;
@@ -318,7 +319,8 @@ struct ParticleFilter {
 
   /// The same with likelihoods of the user's own, one logarithm a particle.
   template <class X>
-  Status update_with(Particles<X>& belief, std::span<const double> log_likelihoods, Random& random) const {
+  UpdateResult update_with(Particles<X>& belief, std::span<const double> log_likelihoods,
+                           Random& random) const {
     if (belief.states.empty()) return Status::depleted;
     if (!(resample_below >= 0.0 && resample_below <= 1.0)) return Status::bad_option;
     const Status status = belief.reweigh(log_likelihoods);

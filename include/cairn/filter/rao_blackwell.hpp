@@ -95,8 +95,8 @@ struct RaoBlackwell {
   /// it was gated, and none otherwise. Refused as a whole where an index is missing or no weight is left.
   template <class H, class V = typename H::Measurement>
     requires(ConditionalMeasurement<H> || detail::explain_sizes<H>)
-  Status update(ConditionalParticles<typename H::State, typename H::Part>& belief, std::size_t index,
-                const H& sensor, const V& z, Random& random) const {
+  UpdateResult update(ConditionalParticles<typename H::State, typename H::Part>& belief, std::size_t index,
+                      const H& sensor, const V& z, Random& random) const {
     if (belief.states.empty()) return Status::depleted;
     const detail::Given<typename H::Measurement, V> given(z);
     if (given.misfit()) return Status::size_mismatch;

@@ -101,6 +101,8 @@ struct SquareRoot {
   double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
   double fading = 1.0;             ///< fading memory: the propagated P is multiplied by this; >= 1
   double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
+  template <Manifold X>
+  using BeliefOf = SquareRootGaussian<X>;
 
   template <class F, class U = typename F::Control>
     requires(LinearisedProcess<F> || detail::explain_sizes<F>)
@@ -165,6 +167,8 @@ struct SquareRootUnscented {
   double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
   double fading = 1.0;             ///< fading memory: the propagated P is multiplied by this; >= 1
   double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
+  template <Manifold X>
+  using BeliefOf = SquareRootGaussian<X>;
 
   template <class F, class U = typename F::Control>
     requires(ProcessModel<F> || detail::explain_sizes<F>)

@@ -59,6 +59,10 @@ UDGaussian<X> UDGaussian<X>::from(const Gaussian<X>& belief) {
 /// Kalman and extended Kalman filter in UD form. Options only.
 struct UDFilter {
   double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
+  double fading = 1.0;             ///< fading memory: F P F^T is multiplied by this at each predict; >= 1
+  double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
+  template <Manifold X>
+  using BeliefOf = UDGaussian<X>;
 
   template <class F, class U = typename F::Control>
     requires(LinearisedProcess<F> || detail::explain_sizes<F>)
@@ -72,7 +76,9 @@ struct UDFilter {
     using Jacobian = std::decay_t<decltype(plain.jacobian(belief.mean, dt))>;
     detail::Column<n, S> w[2 * n], u[n], fu[n];
     S weights[2 * n];
-    const Status noise = factor_noise<n, S>(plain.noise(belief.mean, dt), w, weights);
+    const bool plainly = fading == 1.0 && stabilising_noise == 0.0;
+    const Status noise = plainly ? factor_noise<n, S>(plain.noise(belief.mean, dt), w, weights)
+                                 : factor_more_noise<X>(plain.noise(belief.mean, dt), w, weights);
     if (plain.misfit()) return Status::size_mismatch;
     if (noise != Status::accepted) return noise;
     detail::load_columns(belief.upper, u);
@@ -80,6 +86,8 @@ struct UDFilter {
       fu[j].set_zero();
       weights[j] = belief.diagonal(j);
     });
+    if (!plainly) [[unlikely]]
+      for (int j = 0; j < n; ++j) weights[j] *= static_cast<S>(fading);
     detail::add_product<detail::ProductRows::all>(plain.jacobian(belief.mean, dt), u, fu);
     detail::each<n>([&](int j) { w[j] = fu[j]; });
     const X mean = plain.propagate(belief.mean, dt);
@@ -248,6 +256,15 @@ private:
     } else {
       return factor_dense<N, S>(detail::dense_of(q), w, weights);
     }
+  }
+  /// The same with the stabilising noise; judges the options.
+  template <Manifold X, int N, class S, class Q>
+  [[gnu::noinline]] Status factor_more_noise(const Q& noise, detail::Column<N, S> (&w)[2 * N],
+                                             S (&weights)[2 * N]) const {
+    CovarianceOf<X> q = detail::dense_of(noise);
+    if (!all_finite(q)) return Status::not_finite;
+    const Status status = detail::stabilise<X>(q, fading, stabilising_noise);
+    return status == Status::accepted ? factor_dense<N, S>(q, w, weights) : status;
   }
   template <int N, class S>
   static Status factor_dense(const Matrix<N, N, S>& q, detail::Column<N, S> (&w)[2 * N],
