@@ -76,18 +76,14 @@ struct UDFilter {
     using Jacobian = std::decay_t<decltype(plain.jacobian(belief.mean, dt))>;
     detail::Column<n, S> w[2 * n], u[n], fu[n];
     S weights[2 * n];
-    const bool plainly = fading == 1.0 && stabilising_noise == 0.0;
-    const Status noise = plainly ? factor_noise<n, S>(plain.noise(belief.mean, dt), w, weights)
-                                 : factor_more_noise<X>(plain.noise(belief.mean, dt), w, weights);
+    detail::each<n>([&](int j) { weights[j] = belief.diagonal(j); });
+    const Status noise = fading == 1.0 && stabilising_noise == 0.0
+                             ? factor_noise<n, S>(plain.noise(belief.mean, dt), w, weights)
+                             : fade_and_stabilise<X>(plain.noise(belief.mean, dt), w, weights);
     if (plain.misfit()) return Status::size_mismatch;
     if (noise != Status::accepted) return noise;
     detail::load_columns(belief.upper, u);
-    detail::each<n>([&](int j) {
-      fu[j].set_zero();
-      weights[j] = belief.diagonal(j);
-    });
-    if (!plainly) [[unlikely]]
-      for (int j = 0; j < n; ++j) weights[j] *= static_cast<S>(fading);
+    detail::each<n>([&](int j) { fu[j].set_zero(); });
     detail::add_product<detail::ProductRows::all>(plain.jacobian(belief.mean, dt), u, fu);
     detail::each<n>([&](int j) { w[j] = fu[j]; });
     const X mean = plain.propagate(belief.mean, dt);
@@ -257,14 +253,16 @@ private:
       return factor_dense<N, S>(detail::dense_of(q), w, weights);
     }
   }
-  /// The same with the stabilising noise; judges the options.
+  /// The same with the stabilising noise, and D multiplied by the fading; judges both.
   template <Manifold X, int N, class S, class Q>
-  [[gnu::noinline]] Status factor_more_noise(const Q& noise, detail::Column<N, S> (&w)[2 * N],
-                                             S (&weights)[2 * N]) const {
+  [[gnu::cold, gnu::noinline]] Status fade_and_stabilise(const Q& noise, detail::Column<N, S> (&w)[2 * N],
+                                                         S (&weights)[2 * N]) const {
     CovarianceOf<X> q = detail::dense_of(noise);
     if (!all_finite(q)) return Status::not_finite;
     const Status status = detail::stabilise<X>(q, fading, stabilising_noise);
-    return status == Status::accepted ? factor_dense<N, S>(q, w, weights) : status;
+    if (status != Status::accepted) return status;
+    for (int j = 0; j < N; ++j) weights[j] *= static_cast<S>(fading);
+    return factor_dense<N, S>(q, w, weights);
   }
   template <int N, class S>
   static Status factor_dense(const Matrix<N, N, S>& q, detail::Column<N, S> (&w)[2 * N],
