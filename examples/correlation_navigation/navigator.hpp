@@ -57,7 +57,7 @@ public:
 
   /// Moves by dead reckoning: ground velocity u for dt seconds.
   void predict(const cairn::Vector<2>& u, double dt) {
-    static_cast<void>(cairn::Kalman{}.predict(belief_, motion_, u, dt));
+    static_cast<void>(cairn::Kalman{}.predict(belief_, motion_, dt, u));
   }
 
   /// Takes in a frame seen with this believed heading.

@@ -36,6 +36,7 @@
 #include <cairn/filter/differentiate.hpp>
 #include <cairn/filter/ensemble.hpp>
 #include <cairn/filter/extended.hpp>
+#include <cairn/filter/filter.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/information.hpp>
 #include <cairn/filter/interacting.hpp>

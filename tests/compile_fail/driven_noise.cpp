@@ -15,5 +15,5 @@ struct Broken {
 
 auto step(cairn::Ensemble<cairn::Vector<3>>& belief, const Broken& process, const cairn::Vector<2>& u,
           cairn::Random& random) {
-  return cairn::EnsembleKalman{}.predict(belief, process, u, 1.0, random);
+  return cairn::EnsembleKalman{}.predict(belief, process, 1.0, random, u);
 }

@@ -6,5 +6,5 @@
 #include "models.hpp"
 
 auto step(Belief& belief, const Process& process, const cairn::Vector<2, float>& u) {
-  return cairn::Kalman{}.predict(belief, process, u, 1.0);
+  return cairn::Kalman{}.predict(belief, process, 1.0, u);
 }

@@ -6,7 +6,7 @@
 #include "models.hpp"
 
 auto predict(Belief& belief, const Process& process, const cairn::Vector<2>& u) {
-  return cairn::Kalman{}.predict(belief, process, u, 1.0);
+  return cairn::Kalman{}.predict(belief, process, 1.0, u);
 }
 auto update(Belief& belief, const Sensor& sensor, const cairn::Vector<2>& z) {
   return cairn::Kalman{}.update(belief, sensor, z);

@@ -10,5 +10,5 @@ struct Broken : Process {
 };
 
 auto step(Belief& belief, const Broken& process, const cairn::Vector<2>& u) {
-  return cairn::Kalman{}.predict(belief, process, u, 1.0);
+  return cairn::Kalman{}.predict(belief, process, 1.0, u);
 }

@@ -15,5 +15,5 @@ struct Broken : Continuous {
 };
 
 auto step(Belief& belief, const Broken& process, const cairn::Vector<2>& u) {
-  return cairn::KalmanBucy{}.predict(belief, process, u, 1.0);
+  return cairn::KalmanBucy{}.predict(belief, process, 1.0, u);
 }

@@ -11,5 +11,5 @@ struct Broken : Process {
 
 auto step(cairn::SquareRootGaussian<cairn::Vector<3>>& belief, const Broken& process,
           const cairn::Vector<2>& u) {
-  return cairn::SquareRoot{}.predict(belief, process, u, 1.0);
+  return cairn::SquareRoot{}.predict(belief, process, 1.0, u);
 }

@@ -13,6 +13,7 @@
 #include <cairn/core/statistics.hpp>
 #include <cairn/filter/differentiate.hpp>
 #include <cairn/filter/extended.hpp>
+#include <cairn/filter/filter.hpp>
 #include <cairn/filter/joint_extended.hpp>
 #include <cairn/filter/joint_gaussian.hpp>
 #include <cairn/filter/kalman.hpp>
@@ -22,6 +23,7 @@
 #include <cairn/filter/smoother.hpp>
 #include <cairn/filter/structured.hpp>
 #include <cairn/filter/timeline.hpp>
+#include <cairn/filter/ud.hpp>
 #include <cairn/filter/unscented.hpp>
 #include <cairn/filter/vectorised.hpp>
 #include <cairn/manifold/product.hpp>
@@ -66,9 +68,24 @@ static_assert(cairn::LinearisedMeasurement<LandmarkSighting>);
 static_assert(cairn::InverseModel<Place>);
 }  // namespace joint
 
+namespace filter {
+#include "snippets/filter/filter_1.inc"
+}  // namespace filter
+
 const cairn::Gaussian<cairn::SE2> planar_prior{cairn::SE2(), 0.01 * cairn::Matrix<3>::Identity()};
 const cairn::RangeBearing beacon{.beacon = {5, 1}};
 const cairn::Compass compass;
+
+TEST_CASE("docs: the example of filter.hpp steps any filter") {
+  const cairn::Gaussian<cairn::Vector<2>> prior{cairn::Vector<2>::Zero(), cairn::Matrix<2>::Identity()};
+  auto ud = cairn::UDGaussian<cairn::Vector<2>>::from(prior);
+  auto plain = prior;
+  const cairn::ConstantVelocity<1> process;
+  const cairn::PositionSensor<1, 2> sensor{.covariance = cairn::Matrix<1>(0.25)};
+  CHECK(filter::step(cairn::UDFilter{}, ud, process, 0.1, sensor, cairn::Vector<1>(1.0)));
+  CHECK(filter::step(cairn::Kalman{}, plain, process, 0.1, sensor, cairn::Vector<1>(1.0)));
+  CHECK(ud.mean.isApprox(plain.mean));
+}
 
 TEST_CASE("docs: the example of smoother.hpp smooths a record") {
   using State = cairn::Vector<2>;

@@ -177,8 +177,7 @@ TEST_SUITE("patch_bucy") {
     REQUIRE(PatchBucy{}.integrate(
                 ours, motion, {}, where, map, shape, [&](double) { return held; }, density, 0.0, duration,
                 scratch) == PatchVerdict::accepted);
-    REQUIRE(KalmanBucy{.steps = 400}.filter(*information, motion, NoControl{}, sensor, z, duration) ==
-            Status::accepted);
+    REQUIRE(KalmanBucy{.steps = 400}.filter(*information, motion, sensor, z, duration) == Status::accepted);
     const auto theirs = information->gaussian();
     REQUIRE(theirs.has_value());
     CHECK(distance(ours, *theirs) < 1e-7);

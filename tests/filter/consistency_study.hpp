@@ -117,11 +117,11 @@ Consistency study(const Scenario& scenario, const Filter& filter, const Begin& b
     for (int step = 0; step < steps; ++step) {
       cairn::Status moved;
       if constexpr (requires {
-                      filter.predict(belief, scenario.process, scenario.control, 1.0, filter_random);
+                      filter.predict(belief, scenario.process, 1.0, filter_random, scenario.control);
                     })
-        moved = filter.predict(belief, scenario.process, scenario.control, scenario.dt, filter_random);
+        moved = filter.predict(belief, scenario.process, scenario.dt, filter_random, scenario.control);
       else
-        moved = filter.predict(belief, scenario.process, scenario.control, scenario.dt);
+        moved = filter.predict(belief, scenario.process, scenario.dt, scenario.control);
       truth =
           cairn::sample(cairn::Gaussian<X>{scenario.process.propagate(truth, scenario.control, scenario.dt),
                                            scenario.process.noise(truth, scenario.control, scenario.dt)},

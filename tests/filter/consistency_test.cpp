@@ -34,9 +34,9 @@ void check(const Scenario& scenario, const Filter& filter, const Begin& begin) {
 struct Trusting {
   cairn::Extended filter{};
   template <class F>
-  cairn::Status predict(cairn::Gaussian<cairn::SE2>& belief, const F& process, const cairn::Vector<2>& u,
-                        double dt) const {
-    return filter.predict(belief, process, u, dt);
+  cairn::Status predict(cairn::Gaussian<cairn::SE2>& belief, const F& process, double dt,
+                        const cairn::Vector<2>& u) const {
+    return filter.predict(belief, process, dt, u);
   }
   auto update(cairn::Gaussian<cairn::SE2>& belief, cairn::RangeBearing sensor,
               const cairn::RangeBearing::Measurement& z) const {

@@ -55,7 +55,7 @@ TEST_SUITE("kalman_bucy") {
     const double q = 2.0, r = 0.5;
     const cairn::LinearSensor<1, 1> sensor{Matrix<1>(1.0), Matrix<1>(r)};
     Gaussian<Vector<1>> belief{Vector<1>(0.0), Matrix<1>(0.0)};
-    REQUIRE(KalmanBucy{.steps = 1000}.filter(belief, Brownian{q}, {}, sensor, Vector<1>(0.3), 0.7) ==
+    REQUIRE(KalmanBucy{.steps = 1000}.filter(belief, Brownian{q}, sensor, Vector<1>(0.3), 0.7) ==
             Status::accepted);
     const double expected = std::sqrt(q * r) * std::tanh(std::sqrt(q / r) * 0.7);
     CHECK(std::abs(belief.covariance(0) - expected) < 1e-11);
@@ -66,7 +66,7 @@ TEST_SUITE("kalman_bucy") {
   TEST_CASE("kalman-bucy: without measurements it is the discrete constant-velocity model") {
     const Gaussian<Vector<2>> prior{Vector<2>(1, 2), (Matrix<2>() << 2, 0.3, 0.3, 1).finished()};
     auto continuous = prior, discrete = prior;
-    REQUIRE(KalmanBucy{}.predict(continuous, Gliding{0.7}, {}, 0.9) == Status::accepted);
+    REQUIRE(KalmanBucy{}.predict(continuous, Gliding{0.7}, 0.9) == Status::accepted);
     REQUIRE(cairn::Kalman{}.predict(discrete, cairn::ConstantVelocity<1>{.density = 0.7}, 0.9) ==
             Status::accepted);
     CHECK((continuous.mean - discrete.mean).norm() < 1e-14);
@@ -83,8 +83,8 @@ TEST_SUITE("kalman_bucy") {
     auto by_covariance = prior;
     auto by_information = InformationBelief<Vector<2>>::from(prior).value();
     const KalmanBucy filter{.steps = 500};
-    REQUIRE(filter.filter(by_covariance, Gliding{}, {}, density, z, seconds) == Status::accepted);
-    REQUIRE(filter.filter(by_information, Gliding{}, {}, density, z, seconds) == Status::accepted);
+    REQUIRE(filter.filter(by_covariance, Gliding{}, density, z, seconds) == Status::accepted);
+    REQUIRE(filter.filter(by_information, Gliding{}, density, z, seconds) == Status::accepted);
     const auto back = by_information.gaussian().value();
     CHECK((back.mean - by_covariance.mean).norm() < 1e-10);
     CHECK((back.covariance - by_covariance.covariance).norm() < 1e-10);
@@ -107,11 +107,11 @@ TEST_SUITE("kalman_bucy") {
   TEST_CASE("kalman-bucy: refuses bad steps and numbers and leaves the belief") {
     Gaussian<Vector<1>> belief{Vector<1>(0.0), Matrix<1>(1.0)};
     const cairn::LinearSensor<1, 1> sensor{Matrix<1>(1.0), Matrix<1>(-1.0)};
-    CHECK(KalmanBucy{}.predict(belief, Brownian{}, {}, -0.1) == Status::bad_time_step);
-    CHECK(KalmanBucy{.steps = 0}.predict(belief, Brownian{}, {}, 0.1) == Status::bad_option);
-    CHECK(KalmanBucy{}.predict(belief, Brownian{std::nan("")}, {}, 0.1) == Status::not_finite);
-    CHECK(KalmanBucy{}.predict(belief, Brownian{-100.0}, {}, 0.1) == Status::not_positive_definite);
-    CHECK(KalmanBucy{}.filter(belief, Brownian{}, {}, sensor, Vector<1>(0), 0.1) ==
+    CHECK(KalmanBucy{}.predict(belief, Brownian{}, -0.1) == Status::bad_time_step);
+    CHECK(KalmanBucy{.steps = 0}.predict(belief, Brownian{}, 0.1) == Status::bad_option);
+    CHECK(KalmanBucy{}.predict(belief, Brownian{std::nan("")}, 0.1) == Status::not_finite);
+    CHECK(KalmanBucy{}.predict(belief, Brownian{-100.0}, 0.1) == Status::not_positive_definite);
+    CHECK(KalmanBucy{}.filter(belief, Brownian{}, sensor, Vector<1>(0), 0.1) ==
           Status::not_positive_definite);
     CHECK(belief.mean(0) == 0.0);
     CHECK(belief.covariance(0) == 1.0);

@@ -60,7 +60,7 @@ Nees drive(cairn::Random& random, Mistake mistake) {
   const Vector<2> u(1.0, 0.25);
   const double dt = 0.5;
   for (int step = 0; step < 100; ++step) {
-    REQUIRE(filter.predict(belief, process, u, dt, robot) == Status::accepted);
+    REQUIRE(filter.predict(belief, process, dt, u, robot) == Status::accepted);
     const Matrix<3> q = process.noise(is, u, dt);
     Vector<3> w;
     for (int i = 0; i < 3; ++i) w(i) = random.normal(0, std::sqrt(q(i, i)));
@@ -177,7 +177,7 @@ Outcome map_the_hall(const std::filesystem::path& folder, int robot_number) {
   double time = begin;
   const auto move = [&](double to) {
     if (to <= time) return;
-    REQUIRE(filter.predict(belief, process, control, to - time, robot) == Status::accepted);
+    REQUIRE(filter.predict(belief, process, to - time, control, robot) == Status::accepted);
     dead = process.propagate(dead, control, to - time);
     time = to;
   };

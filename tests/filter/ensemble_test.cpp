@@ -47,7 +47,7 @@ TEST_SUITE("ensemble") {
     const LinearProblem<4, 3> p(random);
     auto belief = Ensemble<Vector<4>>::draw(p.prior, 7, random);
     for (int step = 0; step < 10; ++step) {
-      REQUIRE(EnsembleKalman{}.predict(belief, p.process, {}, 1.0, random) == Status::accepted);
+      REQUIRE(EnsembleKalman{}.predict(belief, p.process, 1.0, random) == Status::accepted);
       auto exact = belief.gaussian();
       const double inflation = step % 2 == 0 ? 1.0 : 1.1;
       exact.covariance *= inflation * inflation;
@@ -72,7 +72,7 @@ TEST_SUITE("ensemble") {
     const LinearProblem<4, 1> p(random);
     auto belief = Ensemble<Vector<4>>::draw(p.prior, 7, random);
     for (int step = 0; step < 10; ++step) {
-      REQUIRE(filter.predict(belief, p.process, {}, 1.0, random) == Status::accepted);
+      REQUIRE(filter.predict(belief, p.process, 1.0, random) == Status::accepted);
       auto exact = belief.gaussian();
       const Vector<1> z(random.normal());
       REQUIRE(Kalman{}.update(exact, p.sensor, z).accepted());
@@ -90,7 +90,7 @@ TEST_SUITE("ensemble") {
       auto exact = p.prior;
       auto belief = Ensemble<Vector<2>>::draw(p.prior, 20000, random);
       for (int step = 0; step < 5; ++step) {
-        REQUIRE(EnsembleKalman{.form = form}.predict(belief, p.process, {}, 1.0, random) == Status::accepted);
+        REQUIRE(EnsembleKalman{.form = form}.predict(belief, p.process, 1.0, random) == Status::accepted);
         REQUIRE(Kalman{}.predict(exact, p.process, 1.0) == Status::accepted);
         const Vector<1> z(random.normal());
         REQUIRE(EnsembleKalman{.form = form}.update(belief, p.sensor, z, random).accepted());
@@ -119,7 +119,7 @@ TEST_SUITE("ensemble") {
     const double nan = std::nan("");
     const EnsembleKalman filter{};
     auto broken = p;
-    CHECK(filter.predict(belief, p.process, {}, -1.0, random) == Status::bad_time_step);
+    CHECK(filter.predict(belief, p.process, -1.0, random) == Status::bad_time_step);
     CHECK(filter.update(belief, p.sensor, Vector<3>(nan, 0, 0), random).status == Status::not_finite);
     CHECK(EnsembleKalman{.gate = 0}.update(belief, p.sensor, z, random).status == Status::bad_option);
     CHECK(EnsembleKalman{.inflation = 0.9}.update(belief, p.sensor, z, random).status == Status::bad_option);
@@ -130,12 +130,12 @@ TEST_SUITE("ensemble") {
     broken.sensor.covariance.setZero();
     CHECK(filter.update(belief, broken.sensor, z, random).status == Status::not_positive_definite);
     broken.process.covariance = -Matrix<4>::Identity();
-    CHECK(filter.predict(belief, broken.process, {}, 1.0, random) == Status::not_positive_definite);
+    CHECK(filter.predict(belief, broken.process, 1.0, random) == Status::not_positive_definite);
     broken.process.covariance(0, 0) = nan;
-    CHECK(filter.predict(belief, broken.process, {}, 1.0, random) == Status::not_finite);
+    CHECK(filter.predict(belief, broken.process, 1.0, random) == Status::not_finite);
     CHECK(belief.members == before);
     Ensemble<Vector<4>> none;
-    CHECK(filter.predict(none, p.process, {}, 1.0, random) == Status::depleted);
+    CHECK(filter.predict(none, p.process, 1.0, random) == Status::depleted);
     CHECK(filter.update(none, p.sensor, z, random).status == Status::depleted);
     belief.members[4](1) = nan;
     CHECK(filter.update(belief, p.sensor, z, random).status == Status::not_finite);

@@ -36,7 +36,7 @@ TEST_SUITE("interacting") {
                                            mu};
     const auto processes = std::tuple(cairn::LinearModel<1>{Matrix<1>(1.0), Matrix<1>(q[0])},
                                       cairn::LinearModel<1>{Matrix<1>(1.0), Matrix<1>(q[1])});
-    REQUIRE(filter.predict(belief, processes, NoControl{}, 1.0) == Status::accepted);
+    REQUIRE(filter.predict(belief, processes, 1.0) == Status::accepted);
     std::array<double, 2> chance{}, mean{}, variance{};
     for (std::size_t j = 0; j < 2; ++j) {
       chance[j] = p[0][j] * mu[0] + p[1][j] * mu[1];

@@ -64,7 +64,7 @@ struct Scene {
       const auto added = belief.augment(cairn::inverted(Sighting{}), z, robot);
       REQUIRE(added.accepted());
       landmarks.push_back(added.id);
-      REQUIRE(JointExtended{}.predict(belief, cairn::Unicycle{}, Vector<2>(1, 0.2), 0.3, robot) ==
+      REQUIRE(JointExtended{}.predict(belief, cairn::Unicycle{}, 0.3, Vector<2>(1, 0.2), robot) ==
               Status::accepted);
     }
   }
@@ -389,7 +389,7 @@ TEST_SUITE("joint_gaussian") {
     same(scene.belief);
     CHECK(scene.belief.marginal(clone.id, scene.robot).covariance.allFinite());
     // what the robot does from now on is between the two
-    REQUIRE(JointExtended{}.predict(scene.belief, cairn::Unicycle{}, Vector<2>(1, 0.5), 1.0, scene.robot) ==
+    REQUIRE(JointExtended{}.predict(scene.belief, cairn::Unicycle{}, 1.0, Vector<2>(1, 0.5), scene.robot) ==
             Status::accepted);
     CHECK(scene.belief.covariance(clone.id) != scene.belief.covariance(scene.robot));
   }
@@ -403,7 +403,7 @@ TEST_SUITE("joint_gaussian") {
     Slam belief;
     const auto now = belief.add(start, p).id;
     const auto then = belief.clone(now).id;
-    REQUIRE(JointExtended{}.predict(belief, drive, u, 1.0, now) == Status::accepted);
+    REQUIRE(JointExtended{}.predict(belief, drive, 1.0, u, now) == Status::accepted);
     const cairn_test::Passage sensor{0.01 * Matrix<3>::Identity()};
     const cairn_test::Passage::State x(start, drive.propagate(start, u, 1.0));
     const Dense h(sensor.jacobian(x)), f(drive.jacobian(start, u, 1.0)),
@@ -621,7 +621,7 @@ TEST_SUITE("joint_gaussian") {
     std::vector<BlockId<SE2>> window;
     std::size_t bytes = 0;
     for (int step = 0; step < 500; ++step) {
-      REQUIRE(JointExtended{}.predict(belief, cairn::Unicycle{}, Vector<2>(1, 0.1), 0.1, robot) ==
+      REQUIRE(JointExtended{}.predict(belief, cairn::Unicycle{}, 0.1, Vector<2>(1, 0.1), robot) ==
               Status::accepted);
       window.push_back(belief.clone(robot).id);
       if (window.size() <= 10) continue;
@@ -671,19 +671,19 @@ TEST_SUITE("joint_gaussian") {
     CHECK(filter.update(belief, Sized{.rows = 2, .noisy = 2}, Vector<d>::Zero(3), robot).status ==
           Status::size_mismatch);
 
-    CHECK(filter.predict(belief, cairn::Unicycle{}, u, -1.0, robot) == Status::bad_time_step);
-    CHECK(filter.predict(belief, cairn::Unicycle{}, u, nan, robot) == Status::bad_time_step);
-    CHECK(filter.predict(belief, cairn::Unicycle{}, Vector<2>(nan, 0), 1.0, robot) == Status::not_finite);
-    CHECK(filter.predict(belief, cairn::Unicycle{.speed_density = -1}, u, 1.0, robot) ==
+    CHECK(filter.predict(belief, cairn::Unicycle{}, -1.0, u, robot) == Status::bad_time_step);
+    CHECK(filter.predict(belief, cairn::Unicycle{}, nan, u, robot) == Status::bad_time_step);
+    CHECK(filter.predict(belief, cairn::Unicycle{}, 1.0, Vector<2>(nan, 0), robot) == Status::not_finite);
+    CHECK(filter.predict(belief, cairn::Unicycle{.speed_density = -1}, 1.0, u, robot) ==
           Status::not_positive_definite);
-    CHECK(filter.predict(belief, cairn::Unicycle{.speed_density = infinity}, u, 1.0, robot) ==
+    CHECK(filter.predict(belief, cairn::Unicycle{.speed_density = infinity}, 1.0, u, robot) ==
           Status::not_finite);
-    CHECK(JointExtended{.fading = 0.9}.predict(belief, cairn::Unicycle{}, u, 1.0, robot) ==
+    CHECK(JointExtended{.fading = 0.9}.predict(belief, cairn::Unicycle{}, 1.0, u, robot) ==
           Status::bad_option);
-    CHECK(JointExtended{.stabilising_noise = -1}.predict(belief, cairn::Unicycle{}, u, 1.0, robot) ==
+    CHECK(JointExtended{.stabilising_noise = -1}.predict(belief, cairn::Unicycle{}, 1.0, u, robot) ==
           Status::bad_option);
-    CHECK(filter.predict(belief, cairn::Unicycle{}, u, 1.0, BlockId<SE2>{}) == Status::unknown_block);
-    CHECK(filter.predict(belief, cairn::Unicycle{}, u, 1.0, BlockId<SE2>{landmark}) == Status::unknown_block);
+    CHECK(filter.predict(belief, cairn::Unicycle{}, 1.0, u, BlockId<SE2>{}) == Status::unknown_block);
+    CHECK(filter.predict(belief, cairn::Unicycle{}, 1.0, u, BlockId<SE2>{landmark}) == Status::unknown_block);
 
     struct Convoy {
       using State = Product<SE2, SE2>;
@@ -858,7 +858,7 @@ TEST_SUITE("joint_gaussian") {
         REQUIRE(
             filter.predict(belief,
                            cairn::Unicycle{.speed_density = 1e-4, .slip_density = 1e-8, .turn_density = 1e-5},
-                           Vector<2>(1, 0.3 * random.normal()), 0.02, scene.robot) == Status::accepted);
+                           0.02, Vector<2>(1, 0.3 * random.normal()), scene.robot) == Status::accepted);
         if (step % 5 == 0) {
           window.push_back(belief.clone(scene.robot).id);
           if (window.size() > 6) {

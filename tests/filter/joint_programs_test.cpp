@@ -136,7 +136,7 @@ struct Program {
     Matrix<n> q = cairn::detail::dense_of(process.noise(x, u, dt));
     q.diagonal().array() += filter.stabilising_noise;
     const auto moved = process.propagate(x, u, dt);
-    REQUIRE(filter.predict(belief, process, u, dt, moving...) == Status::accepted);
+    REQUIRE(filter.predict(belief, process, dt, u, moving...) == Status::accepted);
     dense.transform(Dense(f), Dense(q), named);
     if constexpr (sizeof...(X) == 1) {
       dense.blocks[static_cast<std::size_t>(named[0])].mean = moved;

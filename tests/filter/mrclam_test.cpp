@@ -85,7 +85,7 @@ Outcome drive(const std::filesystem::path& folder, int robot, const Filter& filt
   double time = begin;
   const auto move = [&](double to) {
     if (to <= time) return;
-    REQUIRE(filter.predict(belief, process, control, to - time) == Status::accepted);
+    REQUIRE(filter.predict(belief, process, to - time, control) == Status::accepted);
     dead = process.propagate(dead, control, to - time);
     time = to;
   };

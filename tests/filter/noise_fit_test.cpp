@@ -123,7 +123,7 @@ TEST_SUITE("noise_fit") {
       const Vector<5> offset = matrix<5, 1>(mat["b"], 5 * k);
       const Vector<2> z = matrix<2, 1>(mat["y"], 2 * k);
       record.steps.push_back({offset, 1.0, z});
-      REQUIRE(recorder.predict(process, offset, 1.0) == Status::accepted);
+      REQUIRE(recorder.predict(process, 1.0, offset) == Status::accepted);
       REQUIRE(recorder.update(sensor, z).accepted());
       worst = std::max(worst, (recorder.belief().mean - matrix<5, 1>(mat["xfilt"], 5 * k + 5)).norm());
       worst =

@@ -270,12 +270,9 @@ void run(Tallies& tallies, const std::string& name, const Filter& filter, Belief
       accepted = filter.predict(belief, problem.process, 1.0) == Status::accepted;
     } else {
       const auto taken = filter.update(belief, problem.sensor, problem.z);
-      if constexpr (requires { taken.accepted(); }) {
-        accepted = taken.accepted();
+      accepted = taken.accepted();
+      if constexpr (requires { taken.log_likelihood(); })
         if (accepted) log_likelihood = static_cast<double>(taken.log_likelihood());
-      } else {
-        accepted = taken == Status::accepted;
-      }
     }
     const bool kept = accepted;
     accepted = accepted && give(belief, found);

@@ -429,13 +429,13 @@ TEST_SUITE("refusals") {
         {{not_a_number, 1.0}, {-0.5, 1.5}, {0.0, 0.0}, {0.5, infinite}, {0.5, 0.25}}};
     for (const auto& probability : none) {
       cairn::ModeBelief<X, 2> belief{{mode, mode}, probability};
-      CHECK(filter.predict(belief, std::tuple(walk, walk), cairn::NoControl{}, 1.0) != Status::accepted);
+      CHECK(filter.predict(belief, std::tuple(walk, walk), 1.0) != Status::accepted);
       CHECK(filter.update(belief, sensor, X(2.0)) != Status::accepted);
       CHECK(belief.modes[0].mean(0) == 1.0);
       CHECK(belief.modes[1].covariance(0) == 1.0);
     }
     cairn::ModeBelief<X, 2> belief{{mode, mode}, {0.5, 0.5}};
-    CHECK(filter.predict(belief, std::tuple(walk, walk), cairn::NoControl{}, 1.0) == Status::accepted);
+    CHECK(filter.predict(belief, std::tuple(walk, walk), 1.0) == Status::accepted);
     CHECK(filter.update(belief, sensor, X(2.0)) == Status::accepted);
   }
 
@@ -467,14 +467,13 @@ TEST_SUITE("refusals") {
   TEST_CASE("kalman-bucy: over many time constants it settles, or says that it did not converge") {
     for (const double dt : {0.5, 10.0, 1000.0}) {
       Gaussian<Vector<1>> belief{Vector<1>(5.0), Matrix<1>(2.0)};
-      REQUIRE(cairn::KalmanBucy{}.predict(belief, Decay{}, cairn::NoControl{}, dt) == Status::accepted);
+      REQUIRE(cairn::KalmanBucy{}.predict(belief, Decay{}, dt) == Status::accepted);
       const double p = 1.5 + 0.5 * std::exp(-2 * dt), x = 5.0 * std::exp(-dt);
       CHECK(std::abs(belief.mean(0) - x) < 1e-4);
       CHECK(std::abs(belief.covariance(0) - p) < 1e-4);
     }
     Gaussian<Vector<1>> belief{Vector<1>(5.0), Matrix<1>(2.0)};
-    CHECK(cairn::KalmanBucy{.most_parts = 10}.predict(belief, Decay{}, cairn::NoControl{}, 1000.0) ==
-          Status::not_converged);
+    CHECK(cairn::KalmanBucy{.most_parts = 10}.predict(belief, Decay{}, 1000.0) == Status::not_converged);
     CHECK(belief.mean(0) == 5.0);
   }
 

@@ -126,8 +126,7 @@ TEST_SUITE("particle") {
     auto particles = cairn::draw_particles(p.prior, 20000, random);
     for (int step = 0; step < 10; ++step) {
       REQUIRE(cairn::Kalman{}.predict(exact, p.process, 1.0) == Status::accepted);
-      REQUIRE(cairn::ParticleFilter{}.predict(particles, p.process, NoControl{}, 1.0, random) ==
-              Status::accepted);
+      REQUIRE(cairn::ParticleFilter{}.predict(particles, p.process, 1.0, random) == Status::accepted);
       const Vector<1> z = p.sensor.predict(exact.mean) + Vector<1>(0.5);
       REQUIRE(cairn::Kalman{}.update(exact, p.sensor, z).accepted());
       REQUIRE(cairn::ParticleFilter{}.update(particles, p.sensor, z, random) == Status::accepted);
@@ -142,7 +141,7 @@ TEST_SUITE("particle") {
     const cairn_test::LinearProblem<2, 1> p(random);
     cairn::Particles<Vector<2>> none;
     CHECK(cairn::ParticleFilter{}.update(none, p.sensor, Vector<1>(0), random) == Status::depleted);
-    CHECK(cairn::ParticleFilter{}.predict(none, p.process, NoControl{}, 1.0, random) == Status::depleted);
+    CHECK(cairn::ParticleFilter{}.predict(none, p.process, 1.0, random) == Status::depleted);
     auto particles = cairn::draw_particles(p.prior, 10, random);
     const auto before = particles.log_weights;
     CHECK(cairn::ParticleFilter{}.update(particles, p.sensor, Vector<1>(std::nan("")), random) ==
@@ -201,7 +200,7 @@ TEST_SUITE("interacting") {
     double calm = 0.0, wild = 0.0, x = 0.0;
     for (int step = 0; step < 200; ++step) {
       x += random.normal(0.0, step < 100 ? 0.1 : 2.0);
-      REQUIRE(filter.predict(belief, modes, NoControl{}, 1.0) == Status::accepted);
+      REQUIRE(filter.predict(belief, modes, 1.0) == Status::accepted);
       REQUIRE(filter.update(belief, sensor, Vector<1>(x + random.normal(0.0, 0.1))) == Status::accepted);
       CHECK(belief.probability[0] + belief.probability[1] == doctest::Approx(1.0).epsilon(1e-12));
       (step < 100 ? calm : wild) += belief.probability[1] / 100;
@@ -219,7 +218,7 @@ TEST_SUITE("interacting") {
     auto single = p.prior;
     for (int step = 0; step < 20; ++step) {
       const Vector<1> z(random.normal());
-      REQUIRE(filter.predict(belief, std::tuple(p.process, p.process), NoControl{}, 1.0) == Status::accepted);
+      REQUIRE(filter.predict(belief, std::tuple(p.process, p.process), 1.0) == Status::accepted);
       REQUIRE(filter.update(belief, p.sensor, z) == Status::accepted);
       REQUIRE(cairn::Kalman{}.predict(single, p.process, 1.0) == Status::accepted);
       REQUIRE(cairn::Kalman{}.update(single, p.sensor, z).accepted());
@@ -230,7 +229,7 @@ TEST_SUITE("interacting") {
     CHECK(filter.update(belief, p.sensor, Vector<1>(std::nan(""))) == Status::not_finite);
     CHECK(belief.probability == before);
     const cairn::Interacting<2, cairn::Kalman> bad{.switching = {{{0.9, 0.3}, {0.3, 0.7}}}};
-    CHECK(bad.predict(belief, std::tuple(p.process, p.process), NoControl{}, 1.0) == Status::bad_option);
+    CHECK(bad.predict(belief, std::tuple(p.process, p.process), 1.0) == Status::bad_option);
   }
 }
 

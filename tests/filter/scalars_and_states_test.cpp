@@ -180,12 +180,7 @@ double distance_from_long_double(const Filter& filter, const Make& make) {
     REQUIRE(filter.predict(belief, p.process, 1.0) == Status::accepted);
     REQUIRE(filter.update(belief, p.sensor, z).accepted());
   }
-  Gaussian<Vector<3, S>> plain = [&] {
-    if constexpr (requires { belief.gaussian(); })
-      return belief.gaussian();
-    else
-      return belief;
-  }();
+  const Gaussian<Vector<3, S>> plain = belief.gaussian();
   return cairn_test::relative_error(plain.covariance.template cast<L>(), exact.covariance) +
          cairn_test::relative_error(plain.mean.template cast<L>(), exact.mean);
 }

@@ -344,7 +344,7 @@ struct Table {
   static void check_filter(const std::string& name, const Filter& filter, unsigned of_belief,
                            unsigned predict, unsigned update, const Make& make) {
     check(name + ", predict", of_belief | predict, make,
-          [&](auto& b, const Sizes& s) { return filter.predict(b, F{s}, u, 0.1); });
+          [&](auto& b, const Sizes& s) { return filter.predict(b, F{s}, 0.1, u); });
     check(name + ", update", of_belief | update, make,
           [&](auto& b, const Sizes& s) { return filter.update(b, H{s}, seen_as(s)); });
   }
@@ -364,15 +364,15 @@ struct Table {
     check_filter("AugmentedUnscented", cairn::AugmentedUnscented{}, belief, propagated, looked, make);
     const cairn::AugmentedUnscented augmented;
     check("AugmentedUnscented, driven predict", belief | propagated, make,
-          [&](auto& b, const Sizes& s) { return augmented.predict(b, SizedDrivenProcess<X>{{s}}, u, 0.1); });
+          [&](auto& b, const Sizes& s) { return augmented.predict(b, SizedDrivenProcess<X>{{s}}, 0.1, u); });
     check("AugmentedUnscented, driven update", belief | looked, make, [&](auto& b, const Sizes& s) {
       return augmented.update(b, SizedDrivenSensor<X, Z>{{s}}, seen_as(s));
     });
     check("AugmentedUnscented, step", belief | propagated | looked, make,
-          [&](auto& b, const Sizes& s) { return augmented.step(b, F{s}, u, 0.1, H{s}, seen_as(s)); });
+          [&](auto& b, const Sizes& s) { return augmented.step(b, F{s}, 0.1, H{s}, seen_as(s), u); });
     check("numeric", belief | propagated | looked, make, [&](auto& b, const Sizes& s) {
       auto next = b;
-      Status status = cairn::Extended{}.predict(next, cairn::numeric(F{s}), u, 0.1);
+      Status status = cairn::Extended{}.predict(next, cairn::numeric(F{s}), 0.1, u);
       if (status == Status::accepted)
         status = cairn::Extended{}.update(next, cairn::numeric(H{s}), seen_as(s)).status;
       if (status == Status::accepted) b = next;
@@ -411,11 +411,11 @@ struct Table {
       });
     const cairn::KalmanBucy bucy{.steps = 2};
     check("KalmanBucy, predict", belief | linearised, gaussian<X>,
-          [&](auto& b, const Sizes& s) { return bucy.predict(b, F{s}, u, 0.1); });
+          [&](auto& b, const Sizes& s) { return bucy.predict(b, F{s}, 0.1, u); });
     check("KalmanBucy, filter", belief | linearised | sighted, gaussian<X>,
-          [&](auto& b, const Sizes& s) { return bucy.filter(b, F{s}, u, H{s}, seen_as(s), 0.1); });
+          [&](auto& b, const Sizes& s) { return bucy.filter(b, F{s}, H{s}, seen_as(s), 0.1, u); });
     check("KalmanBucy, information", belief | vector | linearised | sighted, informed,
-          [&](auto& b, const Sizes& s) { return bucy.filter(b, F{s}, u, H{s}, seen_as(s), 0.1); });
+          [&](auto& b, const Sizes& s) { return bucy.filter(b, F{s}, H{s}, seen_as(s), 0.1, u); });
   }
 
   static void sampling_filters() {
@@ -428,16 +428,16 @@ struct Table {
     const auto ensemble = [&](const Sizes& s) { return cairn::Ensemble<X>{states(s)}; };
     const cairn::EnsembleKalman kalman;
     check("EnsembleKalman, predict", odd_one | propagated, ensemble,
-          [&](auto& b, const Sizes& s) { return kalman.predict(b, F{s}, u, 0.1, random); });
+          [&](auto& b, const Sizes& s) { return kalman.predict(b, F{s}, 0.1, random, u); });
     check("EnsembleKalman, driven predict", odd_one | propagated, ensemble, [&](auto& b, const Sizes& s) {
-      return kalman.predict(b, SizedDrivenProcess<X>{{s}}, u, 0.1, random);
+      return kalman.predict(b, SizedDrivenProcess<X>{{s}}, 0.1, random, u);
     });
     check("EnsembleKalman, update", odd_one | looked, ensemble,
           [&](auto& b, const Sizes& s) { return kalman.update(b, H{s}, seen_as(s), random); });
     const auto particles = [&](const Sizes& s) { return cairn::Particles<X>::equal(states(s)); };
     const cairn::ParticleFilter filter;
     check("ParticleFilter, predict", odd_one | propagated, particles,
-          [&](auto& b, const Sizes& s) { return filter.predict(b, F{s}, u, 0.1, random); });
+          [&](auto& b, const Sizes& s) { return filter.predict(b, F{s}, 0.1, random, u); });
     check("ParticleFilter, update", odd_one | looked, particles,
           [&](auto& b, const Sizes& s) { return filter.update(b, H{s}, seen_as(s), random); });
     const auto conditional = [&](const Sizes& s) {
@@ -448,7 +448,7 @@ struct Table {
     };
     const cairn::RaoBlackwell blackwell;
     check("RaoBlackwell, predict", propagated, conditional,
-          [&](auto& b, const Sizes& s) { return blackwell.predict(b, F{s}, u, 0.1, random); });
+          [&](auto& b, const Sizes& s) { return blackwell.predict(b, F{s}, 0.1, random, u); });
     check("RaoBlackwell, update", belief | sighted, conditional,
           [&](auto& b, const Sizes& s) { return blackwell.update(b, 1, H{s}, seen_as(s), random); });
     const auto modes = [](const Sizes& s) {
@@ -461,7 +461,7 @@ struct Table {
     };
     const cairn::Interacting<2, cairn::Kalman> interacting{{}, {{{0.9, 0.1}, {0.1, 0.9}}}};
     check("Interacting, predict", belief | odd_one | linearised, modes,
-          [&](auto& b, const Sizes& s) { return interacting.predict(b, std::tuple(F{s}, F{{}}), u, 0.1); });
+          [&](auto& b, const Sizes& s) { return interacting.predict(b, std::tuple(F{s}, F{{}}), 0.1, u); });
     check("Interacting, update", belief | odd_one | sighted, modes,
           [&](auto& b, const Sizes& s) { return interacting.update(b, H{s}, seen_as(s)); });
   }
@@ -470,7 +470,7 @@ struct Table {
     const auto smooth = [&](const char* name, const auto& filter, unsigned predict, unsigned update) {
       check(std::string(name) + ", predict", belief | predict, gaussian<X>, [&](auto& b, const Sizes& s) {
         cairn::Recorder recorder(filter, b);
-        const Status status = recorder.predict(F{s}, u, 0.1);
+        const Status status = recorder.predict(F{s}, 0.1, u);
         CHECK(recorder.steps().size() == (status == Status::accepted ? 1 : 0));
         CHECK(recorder.smoothed().size() == recorder.steps().size() + 1);
         b = recorder.belief();
@@ -529,7 +529,7 @@ TEST_SUITE("sizes") {
     using X = typename Process::State;
     const auto check = [&](const auto& filter, auto belief) {
       const auto before = belief;
-      CHECK(filter.predict(belief, process, u, 0.1) == Status::size_mismatch);
+      CHECK(filter.predict(belief, process, 0.1, u) == Status::size_mismatch);
       CHECK(same(belief, before));
     };
     const Gaussian<X> prior = gaussian<X>({});
@@ -542,9 +542,9 @@ TEST_SUITE("sizes") {
       check(cairn::InformationFilter{}, *cairn::InformationBelief<X>::from(prior));
       cairn::Random random(1);
       cairn::Ensemble<X> ensemble{{prior.mean, prior.mean}};
-      CHECK(cairn::EnsembleKalman{}.predict(ensemble, process, u, 0.1, random) == Status::size_mismatch);
+      CHECK(cairn::EnsembleKalman{}.predict(ensemble, process, 0.1, random, u) == Status::size_mismatch);
       auto particles = cairn::Particles<X>::equal({prior.mean, prior.mean});
-      CHECK(cairn::ParticleFilter{}.predict(particles, process, u, 0.1, random) == Status::size_mismatch);
+      CHECK(cairn::ParticleFilter{}.predict(particles, process, 0.1, random, u) == Status::size_mismatch);
     }
   }
   template <Filters Which = Filters::all, class Sensor>

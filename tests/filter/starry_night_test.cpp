@@ -115,7 +115,7 @@ Outcome fly(std::map<std::string, cairn_test::MatArray>& mat, std::size_t first,
     Vector<6> u;
     u << column<3>(mat["v_vk_vk_i"], k - 1), column<3>(mat["w_vk_vk_i"], k - 1);
     const double dt = mat["t"].numbers[k] - mat["t"].numbers[k - 1];
-    REQUIRE(filter.predict(belief, process, u, dt) == Status::accepted);
+    REQUIRE(filter.predict(belief, process, dt, u) == Status::accepted);
     for (std::size_t j = 0; j < 20; ++j) {
       const std::size_t at = 4 * (1900 * j + k);
       if (y.numbers[at] < 0.0) continue;

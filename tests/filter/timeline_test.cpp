@@ -66,13 +66,13 @@ Gaussian<SE2> in_order(const Extended& filter, const std::vector<Happening>& sto
   double time = 0.0;
   for (const Happening& h : story) {
     if (h.time > end) break;
-    REQUIRE(filter.predict(belief, Unicycle{}, control, h.time - time) == Status::accepted);
+    REQUIRE(filter.predict(belief, Unicycle{}, h.time - time, control) == Status::accepted);
     time = h.time;
     if (h.kind == 0) control = h.number;
     if (h.kind == 1) static_cast<void>(filter.update(belief, Compass{.sigma = 0.3}, SO2(h.number(0))));
     if (h.kind == 2) static_cast<void>(filter.update(belief, PlanarPosition{.sigma = 0.4}, h.number));
   }
-  if (end > time) REQUIRE(filter.predict(belief, Unicycle{}, control, end - time) == Status::accepted);
+  if (end > time) REQUIRE(filter.predict(belief, Unicycle{}, end - time, control) == Status::accepted);
   return belief;
 }
 
@@ -111,7 +111,7 @@ TEST_SUITE("timeline") {
     const Compass compass{.sigma = 0.3};
     REQUIRE(timeline.measure(compass, SO2(0.5), 1.0).accepted());
     REQUIRE(timeline.measure(compass, SO2(0.5), 1.0).accepted());
-    REQUIRE(Extended{}.predict(twice, Unicycle{}, start, 1.0) == Status::accepted);
+    REQUIRE(Extended{}.predict(twice, Unicycle{}, 1.0, start) == Status::accepted);
     once = twice;
     REQUIRE(Extended{}.update(twice, compass, SO2(0.5)).accepted());
     REQUIRE(Extended{}.update(twice, compass, SO2(0.5)).accepted());

@@ -28,9 +28,9 @@ int main() {
   const Vector<2> u(1.0, 0.1);
   cairn::Random random(1);
   auto belief = prior;
-  bool good = cairn::Extended{}.predict(belief, cairn::Unicycle{}, u, 0.1) == Status::accepted &&
+  bool good = cairn::Extended{}.predict(belief, cairn::Unicycle{}, 0.1, u) == Status::accepted &&
               cairn::Extended{}.update(belief, Compass{}, SO2(0.1)).accepted() &&
-              cairn::Unscented{}.predict(belief, cairn::Unicycle{}, u, 0.1) == Status::accepted &&
+              cairn::Unscented{}.predict(belief, cairn::Unicycle{}, 0.1, u) == Status::accepted &&
               cairn::Unscented{}.update(belief, Compass{}, SO2(std::nan(""))).status == Status::not_finite;
   auto particles = cairn::draw_particles(prior, 100, random);
   good = good && cairn::ParticleFilter{}.update(particles, Compass{}, SO2(0.0), random) == Status::accepted;

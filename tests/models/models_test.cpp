@@ -82,7 +82,7 @@ TEST_SUITE("models") {
       SE2 truth = cairn::sample(belief, random);
       for (int step = 0; step < 20; ++step) {
         const Vector<2> control(1.0, 0.3);
-        REQUIRE(filter.predict(belief, process, control, 0.5) == Status::accepted);
+        REQUIRE(filter.predict(belief, process, 0.5, control) == Status::accepted);
         truth = cairn::sample(
             Gaussian<SE2>{process.propagate(truth, control, 0.5), process.noise(truth, control, 0.5)},
             random);
@@ -116,10 +116,10 @@ TEST_SUITE("models") {
     const Gaussian<SE2> prior{SE2(1, 2, 3), Vector<3>(0.04, 0.09, 0.01).asDiagonal()};
     auto by_hand = prior, by_duals = prior, by_differences = prior;
     const Vector<2> u(1.0, 0.5);
-    REQUIRE(cairn::Extended{}.predict(by_hand, cairn::Unicycle{}, u, 0.5) == Status::accepted);
-    REQUIRE(cairn::Extended{}.predict(by_duals, cairn::automatic(TemplatedUnicycle{}), u, 0.5) ==
+    REQUIRE(cairn::Extended{}.predict(by_hand, cairn::Unicycle{}, 0.5, u) == Status::accepted);
+    REQUIRE(cairn::Extended{}.predict(by_duals, cairn::automatic(TemplatedUnicycle{}), 0.5, u) ==
             Status::accepted);
-    REQUIRE(cairn::Extended{}.predict(by_differences, cairn::numeric(cairn::Unicycle{}), u, 0.5) ==
+    REQUIRE(cairn::Extended{}.predict(by_differences, cairn::numeric(cairn::Unicycle{}), 0.5, u) ==
             Status::accepted);
     CHECK((by_duals.covariance - by_hand.covariance).norm() < 1e-15);
     CHECK((by_differences.covariance - by_hand.covariance).norm() < 1e-9);

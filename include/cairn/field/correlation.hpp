@@ -53,6 +53,27 @@ enum class FixVerdict {
   at_rim,      ///< the best place lies on the rim of the region: the true one may lie outside
 };
 
+/// The verdict as a sentence for a log.
+[[nodiscard]] constexpr const char* explain(FixVerdict verdict) noexcept {
+  switch (verdict) {
+    case FixVerdict::accepted:
+      return "accepted";
+    case FixVerdict::flat_patch:
+      return "no fix: the patch has no variance, or numbers that are not finite";
+    case FixVerdict::flat_map:
+      return "no fix: the map in the region has too little variance or too few samples";
+    case FixVerdict::weak:
+      return "no fix: the best place does not resemble the patch";
+    case FixVerdict::ambiguous:
+      return "no fix: other places resemble the patch nearly as well";
+    case FixVerdict::imprecise:
+      return "no fix: the place is known along one direction alone";
+    case FixVerdict::at_rim:
+      return "no fix: the best place lies on the rim of the region";
+  }
+  return "unknown verdict";
+}
+
 struct SearchOptions {
   double radius = 1000;               ///< half side of the square region of shifts, > 0 [m]
   std::vector<double> headings{0.0};  ///< offsets added to the heading of the guess [rad]

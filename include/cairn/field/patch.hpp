@@ -100,4 +100,25 @@ enum class [[nodiscard]] PatchVerdict {
   size_mismatch,  ///< the frame has not one number a sample, or the motion's run-time sizes do not fit
 };
 
+/// The verdict as a sentence for a log.
+[[nodiscard]] constexpr const char* explain(PatchVerdict verdict) noexcept {
+  switch (verdict) {
+    case PatchVerdict::accepted:
+      return "accepted";
+    case PatchVerdict::flat:
+      return "refused: the map under the frame has no slope, or no contrast to tell gain from bias";
+    case PatchVerdict::outside:
+      return "refused: too few samples lie inside the map";
+    case PatchVerdict::gated:
+      return "refused: the residuals that are left are larger than the noise allows";
+    case PatchVerdict::not_finite:
+      return "refused: NaN or infinity in the frame or the belief";
+    case PatchVerdict::not_positive_definite:
+      return "refused: the covariance of the belief is not positive definite";
+    case PatchVerdict::size_mismatch:
+      return "refused: sizes of the frame, the shape and the motion differ";
+  }
+  return "unknown verdict";
+}
+
 }}  // namespace cairn::CAIRN_ABI

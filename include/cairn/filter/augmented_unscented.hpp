@@ -122,18 +122,14 @@ struct AugmentedUnscented {
   /// covariance.
   template <class F, class U = typename F::Control>
     requires(AnyProcess<F> || detail::explain_sizes<F>)
-  Status predict(Gaussian<typename F::State>& belief, const F& process, const U& control, double dt) const {
+  Status predict(Gaussian<typename F::State>& belief, const F& process, double dt,
+                 const U& control = detail::no_control<U>()) const {
     using S = ScalarOf<typename F::State>;
     S c(0);
     const int n = detail::common_size(belief.mean, belief.covariance);
     const auto pairs = propagated(belief, detail::PlainProcess(process, n, control), dt, 0, c);
     if (pairs.status != Status::accepted) return pairs.status;
     return keep(belief, pairs.points, c);
-  }
-  template <class F>
-    requires(AnyProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
-  Status predict(Gaussian<typename F::State>& belief, const F& process, double dt) const {
-    return predict(belief, process, NoControl{}, dt);
   }
 
   /// Takes in the measurement z, or refuses it and leaves the belief as it was.
@@ -168,8 +164,8 @@ struct AugmentedUnscented {
     requires(AnyProcess<F> || detail::explain_sizes<F>) && (AnyMeasurement<H> || detail::explain_sizes<H>) &&
             std::same_as<typename F::State, typename H::State>
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> step(
-      Gaussian<typename H::State>& belief, const F& process, const U& control, double dt, const H& sensor,
-      const T& z) const {
+      Gaussian<typename H::State>& belief, const F& process, double dt, const H& sensor, const T& z,
+      const U& control = detail::no_control<U>()) const {
     using X = typename H::State;
     using S = ScalarOf<X>;
     using W = typename detail::NoiseOfProcess<F>::type;

@@ -87,8 +87,8 @@ struct EnsembleKalman {
   /// Moves every member by dt and a draw of the noise.
   template <class F, class U = typename F::Control>
     requires(AnyProcess<F> || detail::explain_sizes<F>)
-  Status predict(Ensemble<typename F::State>& belief, const F& process, const U& control, double dt,
-                 Random& random) const {
+  Status predict(Ensemble<typename F::State>& belief, const F& process, double dt, Random& random,
+                 const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
     using W = typename detail::NoiseOfProcess<F>::type;
     using S = ScalarOf<X>;

@@ -45,13 +45,9 @@ struct Extended {
   /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite.
   template <class F, class U = typename F::Control>
     requires(LinearisedProcess<F> || detail::explain_sizes<F>)
-  Status predict(Gaussian<typename F::State>& belief, const F& process, const U& control, double dt) const {
+  Status predict(Gaussian<typename F::State>& belief, const F& process, double dt,
+                 const U& control = detail::no_control<U>()) const {
     return detail::predict_linearised(belief, process, control, dt, fading, stabilising_noise);
-  }
-  template <class F>
-    requires(LinearisedProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
-  Status predict(Gaussian<typename F::State>& belief, const F& process, double dt) const {
-    return predict(belief, process, NoControl{}, dt);
   }
 
   /// Takes in the measurement z, or refuses it and leaves the belief as it was. The innovation is the one

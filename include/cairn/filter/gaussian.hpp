@@ -44,6 +44,10 @@ struct Gaussian {
   X mean;
   Covariance covariance;
 
+  /// Itself, as every belief gives and is made of one (filter.hpp).
+  [[nodiscard]] static Gaussian from(const Gaussian& belief) { return belief; }
+  [[nodiscard]] Gaussian gaussian() const { return *this; }
+
   /// The belief, after checking that the covariance is finite, symmetric (to 1e-9 of the two standard
   /// deviations, 1e-4 in float) and positive semi-definite and fits the mean. Throws Error naming the entry.
   [[nodiscard]] static Gaussian checked(const X& mean, const Covariance& covariance);

@@ -273,13 +273,15 @@ struct InformationBelief {
 struct InformationFilter {
   double fading = 1.0;             ///< fading memory: F P F^T is multiplied by this each step; >= 1
   double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
+  template <Manifold X>
+  using BeliefOf = InformationBelief<X>;
 
   /// Moves the belief by one step of dt. The mean of what is known is moved by the process first, so the
   /// point of linearisation follows the estimate. Refused: a singular F, a Q that is no covariance.
   template <class F, class U = typename F::Control>
     requires(LinearisedProcess<F> || detail::explain_sizes<F>)
-  Status predict(InformationBelief<typename F::State>& belief, const F& process, const U& control,
-                 double dt) const {
+  Status predict(InformationBelief<typename F::State>& belief, const F& process, double dt,
+                 const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
@@ -309,16 +311,11 @@ struct InformationFilter {
     if (plain.misfit()) return Status::size_mismatch;
     return keep(belief, next);
   }
-  template <class F>
-    requires(LinearisedProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
-  Status predict(InformationBelief<typename F::State>& belief, const F& process, double dt) const {
-    return predict(belief, process, NoControl{}, dt);
-  }
 
   /// Adds the information of the measurement z, linearised at the belief's point. O(M^2 N + M N^2).
   template <class H, class V = typename H::Measurement>
     requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
-  Status update(InformationBelief<typename H::State>& belief, const H& sensor, const V& z) const {
+  UpdateResult update(InformationBelief<typename H::State>& belief, const H& sensor, const V& z) const {
     using X = typename H::State;
     using S = ScalarOf<X>;
     constexpr int m = dof<typename H::Measurement>;

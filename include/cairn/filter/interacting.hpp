@@ -8,11 +8,14 @@
 ///   mix      x_j, P_j <- the modes' beliefs weighted by mu_ij = p_ij mu_i / c_j,   c_j = sum_i p_ij mu_i
 ///   predict  each mode by its own process;   update  each by the sensor, mu_j ~ c_j N(residual_j; 0, S_j)
 /// (H. Blom, Y. Bar-Shalom, "The interacting multiple model algorithm for systems with Markovian switching
-/// coefficients", IEEE Trans. Automatic Control 33, 1988.) Works over any filter of Gaussian beliefs.
+/// coefficients", IEEE Trans. Automatic Control 33, 1988.) Works over any filter of Gaussian
+/// beliefs but those in information form, which may have no moments to mix. Mixing goes through the
+/// covariances, updates keep to the form.
 #pragma once
 
 #include <array>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <limits>
 #include <tuple>
@@ -21,7 +24,9 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
+#include <cairn/filter/detail/covariance.hpp>
 #include <cairn/filter/detail/plain_model.hpp>
+#include <cairn/filter/filter.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/status.hpp>
@@ -29,23 +34,33 @@
 
 namespace cairn { inline namespace CAIRN_ABI {
 
-/// R Gaussians and how probable each is (sum 1).
-template <Manifold X, std::size_t R>
+/// R beliefs and how probable each is (sum 1).
+template <Manifold X, std::size_t R, class Mode = Gaussian<X>>
 struct ModeBelief {
-  std::array<Gaussian<X>, R> modes;
+  static_assert(detail::demand_proper_belief<Mode>());
+
+  std::array<Mode, R> modes;
   std::array<double, R> probability;
 
   /// One Gaussian with the mixture's mean (two rounds of tangent averaging) and covariance.
   [[nodiscard]] Gaussian<X> combined() const {
     CAIRN_EXPECTS(fits(), "the modes of a belief have one size");
-    return mixture(modes, probability);
+    return mixture(gaussians(), probability);
+  }
+  [[nodiscard]] decltype(auto) gaussians() const {
+    if constexpr (std::same_as<Mode, Gaussian<X>>)
+      return (modes);
+    else
+      return [&]<std::size_t... J>(std::index_sequence<J...>) {
+        return std::array<Gaussian<X>, R>{modes[J].gaussian()...};
+      }(std::make_index_sequence<R>{});
   }
 
   /// The modes have one size, and their covariances fit it. Always so where that size is fixed.
   [[nodiscard]] bool fits() const {
-    const int n = detail::common_size(modes[0].mean, modes[0].covariance);
+    const int n = detail::size_of_belief(modes[0]);
     bool good = n > 0;
-    for (const Gaussian<X>& mode : modes) good = good && detail::common_size(mode.mean, mode.covariance) == n;
+    for (const Mode& mode : modes) good = good && detail::size_of_belief(mode) == n;
     return good;
   }
 
@@ -96,14 +111,16 @@ struct Interacting {
 
   /// Mixes, then moves every mode by its own process of `processes`. All or none are kept. Refused: rows of
   /// `switching` that do not sum to 1 (bad_option), probabilities that are none (see ModeBelief::weighed).
-  template <Manifold X, class... F, class U = typename std::tuple_element_t<0, std::tuple<F...>>::Control>
+  template <Manifold X, class Mode, class... F,
+            class U = typename std::tuple_element_t<0, std::tuple<F...>>::Control>
     requires(sizeof...(F) == R)
-  Status predict(ModeBelief<X, R>& belief, const std::tuple<F...>& processes, const U& control,
-                 double dt) const {
+  Status predict(ModeBelief<X, R, Mode>& belief, const std::tuple<F...>& processes, double dt,
+                 const U& control = detail::no_control<U>()) const {
     if (!stochastic()) return Status::bad_option;
     if (!belief.fits()) return Status::size_mismatch;
     if (const Status status = belief.weighed(); status != Status::accepted) return status;
-    ModeBelief<X, R> next = belief;
+    const std::array<Gaussian<X>, R>& modes = belief.gaussians();
+    ModeBelief<X, R, Mode> next = belief;
     for (std::size_t j = 0; j < R; ++j) {
       std::array<double, R> weights{};
       double total = 0.0;
@@ -111,13 +128,17 @@ struct Interacting {
       next.probability[j] = total;
       if (!(total > 0.0)) continue;  // a mode that cannot be: its belief no longer matters
       for (double& w : weights) w /= total;
-      next.modes[j] = ModeBelief<X, R>::mixture(belief.modes, weights);
+      const Gaussian<X> mixed = ModeBelief<X, R>::mixture(modes, weights);
+      if constexpr (!std::same_as<Mode, Gaussian<X>>)  // whose from() may throw, and a filter does not
+        if (!detail::is_valid_covariance<dof<X>, ScalarOf<X>>(mixed.covariance))
+          return all_finite(mixed.covariance) ? Status::not_positive_definite : Status::not_finite;
+      next.modes[j] = Mode::from(mixed);
     }
     Status status = Status::accepted;
     [&]<std::size_t... J>(std::index_sequence<J...>) {
       ((status = status != Status::accepted
                      ? status
-                     : filter.predict(next.modes[J], std::get<J>(processes), control, dt)),
+                     : filter.predict(next.modes[J], std::get<J>(processes), dt, control)),
        ...);
     }(std::make_index_sequence<R>{});
     double sum = 0.0;
@@ -129,12 +150,12 @@ struct Interacting {
 
   /// Every mode takes in z; a mode that refuses keeps its belief and loses its weight. Refused by all: the
   /// first mode's reason, and the belief as it was.
-  template <class H, class V = typename H::Measurement>
+  template <class Mode, class H, class V = typename H::Measurement>
     requires(MeasurementModel<H> || detail::explain_sizes<H>)
-  Status update(ModeBelief<typename H::State, R>& belief, const H& sensor, const V& z) const {
+  UpdateResult update(ModeBelief<typename H::State, R, Mode>& belief, const H& sensor, const V& z) const {
     if (!belief.fits()) return Status::size_mismatch;
     if (const Status status = belief.weighed(); status != Status::accepted) return status;
-    ModeBelief<typename H::State, R> next = belief;
+    ModeBelief<typename H::State, R, Mode> next = belief;
     std::array<double, R> weight{};
     Status first_refusal = Status::accepted;
     for (std::size_t j = 0; j < R; ++j) {

@@ -19,7 +19,7 @@
 /// ```
 /// ```cpp
 /// const cairn::JointExtended filter{.gate = cairn::chi_square_quantile(0.999, 2)};
-/// const auto moved = filter.predict(belief, cairn::Unicycle{}, control, dt, robot);     // the others stay
+/// const auto moved = filter.predict(belief, cairn::Unicycle{}, dt, control, robot);     // the others stay
 /// const double distance = filter.innovation(belief, sighting, z, robot, landmark).nis;  // to associate by
 /// const auto seen = filter.update(belief, sighting, z, robot, landmark);                // all blocks learn
 /// ```
@@ -122,12 +122,12 @@ struct JointExtended {
   /// with all others are carried along; the others stay. O(n d^2).
   template <LinearisedProcess F, class... Kinds, class... X>
     requires detail::SpeaksOf<typename F::State, X...>
-  Status predict(JointGaussian<Kinds...>& belief, const F& process, const typename F::Control& control,
-                 double dt, BlockId<X>... ids) const;
+  Status predict(JointGaussian<Kinds...>& belief, const F& process, double dt,
+                 const typename F::Control& control, BlockId<X>... ids) const;
   template <LinearisedProcess F, class... Kinds, class... X>
     requires(detail::SpeaksOf<typename F::State, X...> && std::same_as<typename F::Control, NoControl>)
   Status predict(JointGaussian<Kinds...>& belief, const F& process, double dt, BlockId<X>... ids) const {
-    return predict(belief, process, NoControl{}, dt, ids...);
+    return predict(belief, process, dt, NoControl{}, ids...);
   }
 
   /// Takes in the measurement z of the named blocks, which together are the sensor's State, or refuses it.
@@ -419,8 +419,8 @@ bool JointExtended::lowers(detail::JointCovariance<S>& core, std::span<const det
 
 template <LinearisedProcess F, class... Kinds, class... X>
   requires detail::SpeaksOf<typename F::State, X...>
-Status JointExtended::predict(JointGaussian<Kinds...>& belief, const F& process,
-                              const typename F::Control& control, double dt, BlockId<X>... ids) const {
+Status JointExtended::predict(JointGaussian<Kinds...>& belief, const F& process, double dt,
+                              const typename F::Control& control, BlockId<X>... ids) const {
   using State = typename F::State;
   using S = ScalarOf<State>;
   using Named = detail::StateOfBlocks<X...>;

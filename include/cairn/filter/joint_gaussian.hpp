@@ -12,7 +12,7 @@
 /// const cairn::JointExtended filter{.gate = cairn::chi_square_quantile(0.999, 2)};  // joint_extended.hpp
 /// std::map<int, cairn::BlockId<cairn::Vector<2>>> landmarks;
 /// for (const Entry& entry : log) {
-///   const auto moved = filter.predict(belief, cairn::Unicycle{}, entry.control, dt, robot);
+///   const auto moved = filter.predict(belief, cairn::Unicycle{}, dt, entry.control, robot);
 ///   if (moved != cairn::Status::accepted) return 1;
 ///   for (const auto& [name, z] : entry.sightings) {
 ///     if (const auto known = landmarks.find(name); known != landmarks.end())

@@ -63,7 +63,8 @@ struct KalmanBucy {
   /// Moves the belief by dt without measurement.
   template <class F, class U = typename F::Control>
     requires(ContinuousProcess<F> || detail::explain_sizes<F>)
-  Status predict(Gaussian<typename F::State>& belief, const F& process, const U& control, double dt) const {
+  Status predict(Gaussian<typename F::State>& belief, const F& process, double dt,
+                 const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
     using P = CovarianceOf<X>;
     const detail::PlainProcess plain(process, detail::common_size(belief.mean, belief.covariance), control);
@@ -85,8 +86,8 @@ struct KalmanBucy {
   template <class F, class H, class U = typename F::Control, class V = typename H::Measurement>
     requires(ContinuousProcess<F> || detail::explain_sizes<F>) &&
             (LinearisedMeasurement<H> || detail::explain_sizes<H>)
-  Status filter(Gaussian<typename F::State>& belief, const F& process, const U& control, const H& sensor,
-                const V& z, double dt) const {
+  Status filter(Gaussian<typename F::State>& belief, const F& process, const H& sensor, const V& z, double dt,
+                const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
     using P = CovarianceOf<X>;
     const int n = detail::common_size(belief.mean, belief.covariance);
@@ -116,8 +117,8 @@ struct KalmanBucy {
   template <class F, class H, class U = typename F::Control, class V = typename H::Measurement>
     requires(ContinuousProcess<F> || detail::explain_sizes<F>) &&
             (LinearisedMeasurement<H> || detail::explain_sizes<H>)
-  Status filter(InformationBelief<typename F::State>& belief, const F& process, const U& control,
-                const H& sensor, const V& z, double dt) const {
+  Status filter(InformationBelief<typename F::State>& belief, const F& process, const H& sensor, const V& z,
+                double dt, const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
     using P = CovarianceOf<X>;
     const int n = detail::common_size(belief.point, belief.information, belief.vector);

@@ -59,6 +59,19 @@ namespace cairn { inline namespace CAIRN_ABI {
 /// The control of a process that has none.
 struct NoControl {};
 
+namespace detail {
+
+/// The control where none is given: there is none, and a process that has one must be told it.
+template <class U>
+[[nodiscard]] constexpr U no_control() {
+  static_assert(
+      std::same_as<U, NoControl>,
+      "cairn: this process has a Control, which is not zero by default: give it as the last argument");
+  return U{};
+}
+
+}  // namespace detail
+
 /// Square matrix of the tangent space of X.
 template <Manifold X>
 using CovarianceOf = Matrix<dof<X>, dof<X>, ScalarOf<X>>;

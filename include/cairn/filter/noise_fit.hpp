@@ -21,6 +21,7 @@
 #include <cairn/filter/detail/covariance.hpp>
 #include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/detail/products.hpp>
+#include <cairn/filter/filter.hpp>
 #include <cairn/filter/kalman.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/smoother.hpp>
@@ -139,7 +140,7 @@ Status smooth_record(const Filter& filter, const NoiseRecord<F, H>& record,
   log_likelihood = 0.0;
   Status status = see(record.first);
   for (const auto& step : record.steps) {
-    if (status == Status::accepted) status = recorder.predict(process, step.control, step.dt);
+    if (status == Status::accepted) status = recorder.predict(process, step.dt, step.control);
     if (status == Status::accepted) status = see(step.z);
     if (status != Status::accepted) return status;
   }
@@ -170,6 +171,12 @@ template <class Filter = Kalman, class F, class H>
   NoiseFit<F, H> fit{
       Q::Zero(n, n).eval(), detail::noise_at(sensor, record.prior.mean, misfit), {}, Status::depleted};
   if (record.steps.empty()) return fit;
+  if constexpr (!std::same_as<BeliefOf<Filter, typename F::State>, Gaussian<typename F::State>>)
+    if (n > 0 && !detail::is_valid_covariance<dof<typename F::State>, ScalarOf<typename F::State>>(
+                     record.prior.covariance)) {
+      fit.status = Status::not_positive_definite;
+      return fit;
+    }
   const detail::PlainProcess plain(process, n, record.steps[0].control);
   fit.process = detail::dense_of(plain.noise(record.prior.mean, record.steps[0].dt));
   if (misfit || plain.misfit()) {

@@ -273,8 +273,8 @@ struct ParticleFilter {
   /// Moves every particle and draws its noise.
   template <class F, class U = typename F::Control>
     requires(ProcessModel<F> || detail::explain_sizes<F>)
-  Status predict(Particles<typename F::State>& belief, const F& process, const U& control, double dt,
-                 Random& random) const {
+  Status predict(Particles<typename F::State>& belief, const F& process, double dt, Random& random,
+                 const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
     if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
     if (belief.states.empty()) return Status::depleted;
@@ -298,7 +298,8 @@ struct ParticleFilter {
   /// Weighs every particle by the Gaussian likelihood of z, and resamples where the weights have degenerated.
   template <class H, class V = typename H::Measurement>
     requires(MeasurementModel<H> || detail::explain_sizes<H>)
-  Status update(Particles<typename H::State>& belief, const H& sensor, const V& z, Random& random) const {
+  UpdateResult update(Particles<typename H::State>& belief, const H& sensor, const V& z,
+                      Random& random) const {
     using S = ScalarOf<typename H::State>;
     constexpr int m = dof<typename H::Measurement>;
     if (belief.states.empty()) return Status::depleted;
@@ -318,7 +319,8 @@ struct ParticleFilter {
 
   /// The same with likelihoods of the user's own, one logarithm a particle.
   template <class X>
-  Status update_with(Particles<X>& belief, std::span<const double> log_likelihoods, Random& random) const {
+  UpdateResult update_with(Particles<X>& belief, std::span<const double> log_likelihoods,
+                           Random& random) const {
     if (belief.states.empty()) return Status::depleted;
     if (!(resample_below >= 0.0 && resample_below <= 1.0)) return Status::bad_option;
     const Status status = belief.reweigh(log_likelihoods);

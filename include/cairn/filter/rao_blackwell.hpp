@@ -78,13 +78,13 @@ struct RaoBlackwell {
   /// Moves every sampled state and draws its noise; the parts stay.
   template <class F, Manifold Part, class U = typename F::Control>
     requires(ProcessModel<F> || detail::explain_sizes<F>)
-  Status predict(ConditionalParticles<typename F::State, Part>& belief, const F& process, const U& control,
-                 double dt, Random& random) const {
+  Status predict(ConditionalParticles<typename F::State, Part>& belief, const F& process, double dt,
+                 Random& random, const U& control = detail::no_control<U>()) const {
     Particles<typename F::State> states;
     states.states.reserve(belief.size());
     for (const auto& particle : belief.states) states.states.push_back(particle.state);
     states.log_weights = belief.log_weights;
-    const Status status = particles.predict(states, process, control, dt, random);
+    const Status status = particles.predict(states, process, dt, random, control);
     if (status != Status::accepted) return status;
     for (std::size_t i = 0; i < belief.size(); ++i) belief.states[i].state = states.states[i];
     return status;
@@ -95,8 +95,8 @@ struct RaoBlackwell {
   /// it was gated, and none otherwise. Refused as a whole where an index is missing or no weight is left.
   template <class H, class V = typename H::Measurement>
     requires(ConditionalMeasurement<H> || detail::explain_sizes<H>)
-  Status update(ConditionalParticles<typename H::State, typename H::Part>& belief, std::size_t index,
-                const H& sensor, const V& z, Random& random) const {
+  UpdateResult update(ConditionalParticles<typename H::State, typename H::Part>& belief, std::size_t index,
+                      const H& sensor, const V& z, Random& random) const {
     if (belief.states.empty()) return Status::depleted;
     const detail::Given<typename H::Measurement, V> given(z);
     if (given.misfit()) return Status::size_mismatch;

@@ -32,6 +32,7 @@
 #include <cairn/filter/detail/covariance.hpp>
 #include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/extended.hpp>
+#include <cairn/filter/filter.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/status.hpp>
@@ -67,15 +68,26 @@ template <class Filter = Extended>
 struct Robust {
   Filter filter{};
   double limit = 9.0;  ///< NIS above which R is raised; > 0, usually a chi-square quantile
+  template <Manifold X>
+  using BeliefOf = cairn::BeliefOf<Filter, X>;
+
+  /// That of the filter.
+  template <Belief B, class F, class U = typename F::Control>
+    requires(ProcessModel<F> || detail::explain_sizes<F>)
+  Status predict(B& belief, const F& process, double dt, const U& control = detail::no_control<U>()) const {
+    return filter.predict(belief, process, dt, control);
+  }
 
   /// Like filter.update; where R was raised the innovation is that of the raised R. not_positive_definite
   /// where no factor would do, as for R = 0.
   template <class H, class V = typename H::Measurement>
     requires(MeasurementModel<H> || detail::explain_sizes<H>)
-  auto update(Gaussian<typename H::State>& belief, const H& sensor, const V& z) const {
+  auto update(cairn::BeliefOf<Filter, typename H::State>& belief, const H& sensor, const V& z) const {
     using S = ScalarOf<typename H::State>;
+    using B = cairn::BeliefOf<Filter, typename H::State>;
     constexpr int m = dof<typename H::Measurement>;
-    const Gaussian<typename H::State> before = belief;
+    static_assert(detail::demand_proper_belief<B>());
+    const B before = belief;
     auto innovation = filter.update(belief, sensor, z);
     if (!(limit > 0.0)) {
       belief = before;
@@ -83,7 +95,7 @@ struct Robust {
     }
     const bool judged = innovation.accepted() || innovation.status == Status::gated;
     if (!judged || !(innovation.nis > static_cast<S>(limit))) return innovation;
-    const detail::PlainSensor plain(sensor, detail::common_size(before.mean, before.covariance), z);
+    const detail::PlainSensor plain(sensor, detail::size_of_belief(before), z);
     const Matrix<m, m, S> r = detail::dense_of(plain.noise(before.mean));
     const auto nis = [&](double factor) {
       const Matrix<m, m, S> s = innovation.covariance + static_cast<S>(factor - 1.0) * r;
@@ -118,13 +130,15 @@ template <MeasurementModel H>
 /// Repeats the update with R / weight(t) until t, of the residual after it, no longer changes the weight
 /// (expectation-maximisation, or iteratively reweighted least squares: the posterior rises at every round).
 template <class Filter, MeasurementModel H, class V, class Weight>
-auto reweighted_update(const Filter& filter, Gaussian<typename H::State>& belief, const H& sensor, const V& z,
-                       const Weight& weight) {
+auto reweighted_update(const Filter& filter, BeliefOf<Filter, typename H::State>& belief, const H& sensor,
+                       const V& z, const Weight& weight) {
+  using B = BeliefOf<Filter, typename H::State>;
   using S = ScalarOf<typename H::State>;
   constexpr int m = dof<typename H::Measurement>;
-  const PlainSensor plain(sensor, common_size(belief.mean, belief.covariance), z);
-  const Gaussian<typename H::State> before = belief;
-  const auto residual_size = [&](const Gaussian<typename H::State>& updated) {
+  static_assert(demand_proper_belief<B>());
+  const PlainSensor plain(sensor, size_of_belief(belief), z);
+  const B before = belief;
+  const auto residual_size = [&](const B& updated) {
     const Vector<m, S> r = plain.residual(updated.mean);
     const Matrix<m, m, S> noise = dense_of(plain.noise(updated.mean));
     using std::sqrt;
@@ -140,7 +154,7 @@ auto reweighted_update(const Filter& filter, Gaussian<typename H::State>& belief
   constexpr double close = std::is_same_v<S, float> ? 1e-5 : 1e-9;
   double factor = 1.0 / weight(residual_size(belief));
   for (int step = 0; step < 1000; ++step) {
-    Gaussian<typename H::State> next = before;
+    B next = before;
     const auto found = filter.update(next, Inflated<H>{sensor, factor}, z);
     if (!found.accepted()) {
       belief = before;
@@ -165,11 +179,20 @@ template <class Filter = Extended>
 struct Huber {
   Filter filter{};
   double threshold = 1.345;  ///< residual in standard deviations beyond which it counts linearly; > 0
+  template <Manifold X>
+  using BeliefOf = cairn::BeliefOf<Filter, X>;
+
+  /// That of the filter.
+  template <Belief B, class F, class U = typename F::Control>
+    requires(ProcessModel<F> || detail::explain_sizes<F>)
+  Status predict(B& belief, const F& process, double dt, const U& control = detail::no_control<U>()) const {
+    return filter.predict(belief, process, dt, control);
+  }
 
   /// Like filter.update; the innovation and the covariance are those of the weighed R.
   template <class H, class V = typename H::Measurement>
     requires(MeasurementModel<H> || detail::explain_sizes<H>)
-  auto update(Gaussian<typename H::State>& belief, const H& sensor, const V& z) const {
+  auto update(cairn::BeliefOf<Filter, typename H::State>& belief, const H& sensor, const V& z) const {
     if (!(threshold > 0.0)) return detail::refused_as<H>(Status::bad_option);
     const auto weight = [&](double t) { return t > threshold ? threshold / t : 1.0; };
     return detail::reweighted_update(filter, belief, sensor, z, weight);
@@ -181,11 +204,20 @@ template <class Filter = Extended>
 struct StudentT {
   Filter filter{};
   double degrees = 4.0;  ///< of freedom, dof above; small for heavy tails; > 0
+  template <Manifold X>
+  using BeliefOf = cairn::BeliefOf<Filter, X>;
+
+  /// That of the filter.
+  template <Belief B, class F, class U = typename F::Control>
+    requires(ProcessModel<F> || detail::explain_sizes<F>)
+  Status predict(B& belief, const F& process, double dt, const U& control = detail::no_control<U>()) const {
+    return filter.predict(belief, process, dt, control);
+  }
 
   /// Like filter.update; the innovation and the covariance are those of the weighed R.
   template <class H, class V = typename H::Measurement>
     requires(MeasurementModel<H> || detail::explain_sizes<H>)
-  auto update(Gaussian<typename H::State>& belief, const H& sensor, const V& z) const {
+  auto update(cairn::BeliefOf<Filter, typename H::State>& belief, const H& sensor, const V& z) const {
     if (!(degrees > 0.0)) return detail::refused_as<H>(Status::bad_option);
     const int m = dof_of(detail::Given<typename H::Measurement, V>(z).value());
     const auto weight = [&](double t) { return (degrees + m) / (degrees + t * t); };

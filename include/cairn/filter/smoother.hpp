@@ -37,6 +37,7 @@
 #include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/detail/products.hpp>
 #include <cairn/filter/extended.hpp>
+#include <cairn/filter/filter.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/kalman.hpp>
 #include <cairn/filter/model.hpp>
@@ -46,6 +47,9 @@
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
+
+struct AugmentedUnscented;
+struct SquareRootUnscented;
 
 /// One prediction as a smoother needs it: what was known before, what was predicted, and what the state after
 /// says about the state before.
@@ -105,6 +109,15 @@ template <Manifold X>
          has_size(step.given_after, n, n);
 }
 
+/// The filter that predicts: that inside of one which is around another.
+template <class Filter>
+[[nodiscard]] const auto& predicting_filter(const Filter& filter) {
+  if constexpr (requires { filter.filter; })
+    return predicting_filter(filter.filter);
+  else
+    return filter;
+}
+
 /// The step that led from `before` to `predicted`.
 template <class Filter, class F, class U>
 [[nodiscard]] RecordedStep<typename F::State> record_step(const Filter& filter,
@@ -115,6 +128,10 @@ template <class Filter, class F, class U>
   using S = ScalarOf<X>;
   using std::sqrt;
   constexpr int n = dof<X>;
+  static_assert(
+      !std::same_as<Filter, AugmentedUnscented> || LinearProcess<F>,
+      "cairn: a Recorder of AugmentedUnscented takes linear processes: where the noise bends, what a "
+      "state says of the one before is no sum of a moved and an added part");
   const PlainProcess plain(process, common_size(before.mean, before.covariance), u);
   const CovarianceOf<X> root = semi_definite_root<n, S>(before.covariance);
   const int ns = static_cast<int>(root.rows());
@@ -127,7 +144,7 @@ template <class Filter, class F, class U>
   }
   const S faded = sqrt(static_cast<S>(fading)), more = sqrt(static_cast<S>(fading - 1.0));
   const CovarianceOf<X> root_q = semi_definite_root<n, S>(q);
-  constexpr bool unscented = std::same_as<Filter, Unscented>;
+  constexpr bool unscented = std::same_as<Filter, Unscented> || std::same_as<Filter, SquareRootUnscented>;
   constexpr int count = unscented ? 4 : 3;  // blocks of n rows: image, fading, noise and what is bent
   constexpr int rows = n == dynamic ? dynamic : count * n + 1;
   Matrix<rows, size_sum<n, n>, S> array = Matrix<rows, size_sum<n, n>, S>::Zero(count * ns + 1, 2 * ns);
@@ -175,25 +192,27 @@ template <Manifold X>
   return {retract(step.before.mean, correction), step.given_after + detail::squared_root<n, S>(root)};
 }
 
-/// Runs a filter and remembers what smoothing needs: one RecordedStep a prediction.
+/// Runs a filter and remembers what smoothing needs: one RecordedStep a prediction. The filter's own form of
+/// belief is kept; the steps, and so the smoother, are of covariances.
 template <class Filter, Manifold X>
 class Recorder {
+  static_assert(detail::demand_proper_belief<BeliefOf<Filter, X>>());
+
 public:
-  Recorder(const Filter& filter, const Gaussian<X>& prior) : filter_(filter), belief_(prior) {}
+  using Belief = BeliefOf<Filter, X>;
+
+  /// Throws Error where the filter's belief is of another form than the prior, which is no covariance.
+  Recorder(const Filter& filter, const Gaussian<X>& prior) : filter_(filter), belief_(Belief::from(prior)) {}
 
   template <class F, class U = typename F::Control>
     requires(ProcessModel<F> || detail::explain_sizes<F>)
-  Status predict(const F& process, const U& control, double dt) {
-    const Gaussian<X> before = belief_;
-    const Status status = filter_.predict(belief_, process, control, dt);
+  Status predict(const F& process, double dt, const U& control = detail::no_control<U>()) {
+    const Belief before = belief_;
+    const Status status = filter_.predict(belief_, process, dt, control);
     if (status == Status::accepted)
-      steps_.push_back(detail::record_step(filter_, before, belief_, process, control, dt));
+      steps_.push_back(detail::record_step(detail::predicting_filter(filter_), before.gaussian(),
+                                           belief_.gaussian(), process, control, dt));
     return status;
-  }
-  template <class F>
-    requires(ProcessModel<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
-  Status predict(const F& process, double dt) {
-    return predict(process, NoControl{}, dt);
   }
 
   template <class H, class V = typename H::Measurement>
@@ -203,12 +222,12 @@ public:
   }
 
   /// The filter's belief now.
-  [[nodiscard]] const Gaussian<X>& belief() const noexcept { return belief_; }
+  [[nodiscard]] const Belief& belief() const noexcept { return belief_; }
   [[nodiscard]] const std::vector<RecordedStep<X>>& steps() const noexcept { return steps_; }
 
   /// Every moment given the whole record: element 0 before the first prediction, the last one the filter's.
   [[nodiscard]] std::vector<Gaussian<X>> smoothed() const {
-    std::vector<Gaussian<X>> path(steps_.size() + 1, belief_);
+    std::vector<Gaussian<X>> path(steps_.size() + 1, belief_.gaussian());
     for (std::size_t k = steps_.size(); k-- > 0;) path[k] = smooth_back(steps_[k], path[k + 1]);
     return path;
   }
@@ -216,7 +235,7 @@ public:
   /// The moment `lag` predictions ago given everything until now; nothing if there are fewer. O(lag).
   [[nodiscard]] std::optional<Gaussian<X>> lagged(std::size_t lag) const {
     if (lag > steps_.size()) return std::nullopt;
-    Gaussian<X> belief = belief_;
+    Gaussian<X> belief = belief_.gaussian();
     for (std::size_t k = 0; k < lag; ++k) belief = smooth_back(steps_[steps_.size() - 1 - k], belief);
     return belief;
   }
@@ -228,7 +247,7 @@ public:
 
 private:
   Filter filter_;
-  Gaussian<X> belief_;
+  Belief belief_;
   std::vector<RecordedStep<X>> steps_;
 };
 

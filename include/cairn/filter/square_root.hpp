@@ -101,11 +101,13 @@ struct SquareRoot {
   double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
   double fading = 1.0;             ///< fading memory: the propagated P is multiplied by this; >= 1
   double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
+  template <Manifold X>
+  using BeliefOf = SquareRootGaussian<X>;
 
   template <class F, class U = typename F::Control>
     requires(LinearisedProcess<F> || detail::explain_sizes<F>)
-  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, const U& control,
-                 double dt) const {
+  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, double dt,
+                 const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
     using std::sqrt;
@@ -127,11 +129,6 @@ struct SquareRoot {
     detail::put_transposed(array, size, 0, detail::semi_definite_root<n, S>(q));
     detail::triangularise(array);
     return detail::keep_root(belief, mean, array, size);
-  }
-  template <class F>
-    requires(LinearisedProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
-  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, double dt) const {
-    return predict(belief, process, NoControl{}, dt);
   }
 
   template <class H, class V = typename H::Measurement>
@@ -170,11 +167,13 @@ struct SquareRootUnscented {
   double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
   double fading = 1.0;             ///< fading memory: the propagated P is multiplied by this; >= 1
   double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
+  template <Manifold X>
+  using BeliefOf = SquareRootGaussian<X>;
 
   template <class F, class U = typename F::Control>
     requires(ProcessModel<F> || detail::explain_sizes<F>)
-  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, const U& control,
-                 double dt) const {
+  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, double dt,
+                 const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
     using std::sqrt;
@@ -199,11 +198,6 @@ struct SquareRootUnscented {
     detail::put_transposed(array, 2 * size + 1, 0, detail::semi_definite_root<n, S>(q));
     detail::triangularise(array);
     return detail::keep_root(belief, mean, array, size);
-  }
-  template <class F>
-    requires(ProcessModel<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
-  Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, double dt) const {
-    return predict(belief, process, NoControl{}, dt);
   }
 
   template <class H, class V = typename H::Measurement>

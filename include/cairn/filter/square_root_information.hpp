@@ -95,13 +95,15 @@ struct SquareRootInformation {
 struct SquareRootInformationFilter {
   double fading = 1.0;             ///< fading memory: F P F^T is multiplied by this each step; >= 1
   double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
+  template <Manifold X>
+  using BeliefOf = SquareRootInformation<X>;
 
   /// Moves the belief by one step of dt, and the point of linearisation to the estimate before, where there
   /// is one. Refused: a singular F. O(n^3).
   template <class F, class U = typename F::Control>
     requires(LinearisedProcess<F> || detail::explain_sizes<F>)
-  Status predict(SquareRootInformation<typename F::State>& belief, const F& process, const U& control,
-                 double dt) const {
+  Status predict(SquareRootInformation<typename F::State>& belief, const F& process, double dt,
+                 const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
@@ -123,16 +125,11 @@ struct SquareRootInformationFilter {
     if (plain.misfit()) return Status::size_mismatch;
     return keep(belief, next);
   }
-  template <class F>
-    requires(LinearisedProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
-  Status predict(SquareRootInformation<typename F::State>& belief, const F& process, double dt) const {
-    return predict(belief, process, NoControl{}, dt);
-  }
 
   /// Adds the information of the measurement z, linearised at the belief's point. O((n + m) n^2).
   template <class H, class V = typename H::Measurement>
     requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
-  Status update(SquareRootInformation<typename H::State>& belief, const H& sensor, const V& z) const {
+  UpdateResult update(SquareRootInformation<typename H::State>& belief, const H& sensor, const V& z) const {
     using X = typename H::State;
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;

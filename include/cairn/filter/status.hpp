@@ -93,4 +93,15 @@ struct [[nodiscard]] Innovation {
   }
 };
 
+/// What an update says of itself where it makes no innovation, as that of an information form, which would
+/// need P, or of a mixture. Converts to its status.
+struct [[nodiscard]] UpdateResult {
+  Status status = Status::accepted;
+
+  [[nodiscard]] constexpr bool accepted() const noexcept { return status == Status::accepted; }
+  constexpr UpdateResult() noexcept = default;
+  constexpr UpdateResult(Status found) noexcept : status(found) {}
+  constexpr operator Status() const noexcept { return status; }
+};
+
 }}  // namespace cairn::CAIRN_ABI

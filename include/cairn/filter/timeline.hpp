@@ -12,6 +12,7 @@
 /// const auto late = timeline.measure(beacon, z, 1.1);             // 1.4 s is taken back and done again
 /// const std::optional<cairn::Gaussian<cairn::SE2>> later = timeline.at(1.5);
 /// ```
+/// Any filter of filter.hpp may take the place of Extended; its form of belief is kept.
 ///
 /// The beliefs after the events of the last `horizon` seconds are kept; what comes late is put in its place
 /// and the events after it are repeated, so the belief is exactly that of the filter that got everything in
@@ -29,6 +30,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/filter/detail/plain_model.hpp>
+#include <cairn/filter/filter.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/filter/status.hpp>
@@ -44,10 +46,11 @@ class Timeline {
 public:
   using State = typename F::State;
   using Control = typename F::Control;
+  using Belief = BeliefOf<Filter, State>;
 
   /// The belief `prior` at `time` [s], `control` from then on; events may come up to `horizon` [s] late.
-  Timeline(const Filter& filter, const F& process, const Gaussian<State>& prior, double time,
-           const Control& control, double horizon)
+  Timeline(const Filter& filter, const F& process, const Belief& prior, double time, const Control& control,
+           double horizon)
       : filter_(filter), process_(process), horizon_(horizon), base_{time, control, prior} {
     CAIRN_EXPECTS(horizon >= 0.0 && time - time == 0.0, "a Timeline needs a finite time and a horizon >= 0");
   }
@@ -58,8 +61,8 @@ public:
     const detail::Given<Control, U> given(u);
     if (given.misfit()) return Status::size_mismatch;
     if constexpr (requires { requires Control::SizeAtCompileTime == dynamic; }) {
-      Gaussian<State> here = base_.after;  // what the process says of its size, before it is remembered
-      const Status status = filter_.predict(here, process_, given.value(), 0.0);
+      Belief here = base_.after;  // what the process says of its size, before it is remembered
+      const Status status = filter_.predict(here, process_, 0.0, given.value());
       if (status == Status::size_mismatch) return status;
     }
     return insert(Event({time, given.value(), base_.after}, Steering{}));
@@ -70,10 +73,11 @@ public:
   /// for an earlier moment may let it in.
   template <class Sensor, class V = typename Sensor::Measurement>
     requires(std::same_as<Sensor, H> || ...)
-  Innovation<dof<typename Sensor::Measurement>, ScalarOf<State>> measure(const Sensor& sensor, const V& z,
-                                                                         double time) {
-    Innovation<dof<typename Sensor::Measurement>, ScalarOf<State>> innovation;
+  auto measure(const Sensor& sensor, const V& z, double time) {
+    using Result =
+        decltype(filter_.update(base_.after, sensor, std::declval<typename Sensor::Measurement>()));
     const detail::Given<typename Sensor::Measurement, V> given(z);
+    Result innovation{};
     innovation.status = given.misfit() ? Status::size_mismatch : accepts(time);
     if (innovation.status != Status::accepted) return innovation;
     const Moment& last = before(place(time));
@@ -90,13 +94,13 @@ public:
   /// Moment of the last event [s], or of the prior.
   [[nodiscard]] double time() const noexcept { return before(events_.size()).time; }
   /// The belief after the last event.
-  [[nodiscard]] const Gaussian<State>& belief() const noexcept { return before(events_.size()).after; }
+  [[nodiscard]] const Belief& belief() const noexcept { return before(events_.size()).after; }
   /// Number of events remembered.
   [[nodiscard]] std::size_t size() const noexcept { return events_.size(); }
 
   /// The belief at `time` from all events up to it; nothing before the horizon, or where the prediction is
   /// refused.
-  [[nodiscard]] std::optional<Gaussian<State>> at(double time) const {
+  [[nodiscard]] std::optional<Belief> at(double time) const {
     if (accepts(time) != Status::accepted) return std::nullopt;
     const Moment& last = before(place(time));
     Moment now{time, last.control, last.after};
@@ -108,7 +112,7 @@ private:
   struct Moment {
     double time;
     Control control;  ///< from then on
-    Gaussian<State> after;
+    Belief after;
   };
   struct Steering {};
   template <class Sensor>
@@ -139,7 +143,7 @@ private:
   /// Moves now.after from `since` to now.time. Events of one moment have no step between them.
   Status advance(Moment& now, double since) const {
     if (now.time == since) return Status::accepted;
-    return filter_.predict(now.after, process_, now.control, now.time - since);
+    return filter_.predict(now.after, process_, now.time - since, now.control);
   }
 
   Status insert(Event event) {
@@ -175,7 +179,7 @@ private:
     return Status::accepted;
   }
 
-  void apply(const Event& event, Gaussian<State>& belief) const {
+  void apply(const Event& event, Belief& belief) const {
     std::visit(
         [&](const auto& what) {
           if constexpr (!std::is_same_v<std::decay_t<decltype(what)>, Steering>)

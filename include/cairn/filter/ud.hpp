@@ -59,10 +59,15 @@ UDGaussian<X> UDGaussian<X>::from(const Gaussian<X>& belief) {
 /// Kalman and extended Kalman filter in UD form. Options only.
 struct UDFilter {
   double gate = std::numeric_limits<double>::infinity();  ///< refuse a measurement whose NIS is above; > 0
+  double fading = 1.0;             ///< fading memory: F P F^T is multiplied by this at each predict; >= 1
+  double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
+  template <Manifold X>
+  using BeliefOf = UDGaussian<X>;
 
   template <class F, class U = typename F::Control>
     requires(LinearisedProcess<F> || detail::explain_sizes<F>)
-  Status predict(UDGaussian<typename F::State>& belief, const F& process, const U& control, double dt) const {
+  Status predict(UDGaussian<typename F::State>& belief, const F& process, double dt,
+                 const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
@@ -71,14 +76,14 @@ struct UDFilter {
     using Jacobian = std::decay_t<decltype(plain.jacobian(belief.mean, dt))>;
     detail::Column<n, S> w[2 * n], u[n], fu[n];
     S weights[2 * n];
-    const Status noise = factor_noise<n, S>(plain.noise(belief.mean, dt), w, weights);
+    detail::each<n>([&](int j) { weights[j] = belief.diagonal(j); });
+    const Status noise = fading == 1.0 && stabilising_noise == 0.0
+                             ? factor_noise<n, S>(plain.noise(belief.mean, dt), w, weights)
+                             : fade_and_stabilise<X>(plain.noise(belief.mean, dt), w, weights);
     if (plain.misfit()) return Status::size_mismatch;
     if (noise != Status::accepted) return noise;
     detail::load_columns(belief.upper, u);
-    detail::each<n>([&](int j) {
-      fu[j].set_zero();
-      weights[j] = belief.diagonal(j);
-    });
+    detail::each<n>([&](int j) { fu[j].set_zero(); });
     detail::add_product<detail::ProductRows::all>(plain.jacobian(belief.mean, dt), u, fu);
     detail::each<n>([&](int j) { w[j] = fu[j]; });
     const X mean = plain.propagate(belief.mean, dt);
@@ -90,11 +95,6 @@ struct UDFilter {
     belief.mean = mean;
     keep(belief, u, d);
     return Status::accepted;
-  }
-  template <class F>
-    requires(LinearisedProcess<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
-  Status predict(UDGaussian<typename F::State>& belief, const F& process, double dt) const {
-    return predict(belief, process, NoControl{}, dt);
   }
 
   template <class H, class V = typename H::Measurement>
@@ -252,6 +252,17 @@ private:
     } else {
       return factor_dense<N, S>(detail::dense_of(q), w, weights);
     }
+  }
+  /// The same with the stabilising noise, and D multiplied by the fading; judges both.
+  template <Manifold X, int N, class S, class Q>
+  [[gnu::cold, gnu::noinline]] Status fade_and_stabilise(const Q& noise, detail::Column<N, S> (&w)[2 * N],
+                                                         S (&weights)[2 * N]) const {
+    CovarianceOf<X> q = detail::dense_of(noise);
+    if (!all_finite(q)) return Status::not_finite;
+    const Status status = detail::stabilise<X>(q, fading, stabilising_noise);
+    if (status != Status::accepted) return status;
+    for (int j = 0; j < N; ++j) weights[j] *= static_cast<S>(fading);
+    return factor_dense<N, S>(q, w, weights);
   }
   template <int N, class S>
   static Status factor_dense(const Matrix<N, N, S>& q, detail::Column<N, S> (&w)[2 * N],

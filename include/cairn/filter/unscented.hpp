@@ -118,7 +118,8 @@ struct Unscented {
   /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite, a P that is no covariance.
   template <class F, class U = typename F::Control>
     requires(ProcessModel<F> || detail::explain_sizes<F>)
-  Status predict(Gaussian<typename F::State>& belief, const F& process, const U& control, double dt) const {
+  Status predict(Gaussian<typename F::State>& belief, const F& process, double dt,
+                 const U& control = detail::no_control<U>()) const {
     if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
     const int n = detail::common_size(belief.mean, belief.covariance);
     const detail::PlainProcess plain(process, n, control);
@@ -130,11 +131,6 @@ struct Unscented {
     decltype(auto) q = plain.noise(belief.mean, dt);
     if (plain.misfit()) return Status::size_mismatch;
     return advance(belief, plain, points_to, q, c2);
-  }
-  template <class F>
-    requires(ProcessModel<F> || detail::explain_sizes<F>) && std::same_as<typename F::Control, NoControl>
-  Status predict(Gaussian<typename F::State>& belief, const F& process, double dt) const {
-    return predict(belief, process, NoControl{}, dt);
   }
 
   /// Takes in the measurement z, or refuses it and leaves the belief as it was.

@@ -6,7 +6,7 @@
 /// lanes.
 ///
 /// ```cpp
-/// const cairn::Status status = unscented.predict(belief, cairn::vectorised(vehicle), u, dt);
+/// const cairn::Status status = unscented.predict(belief, cairn::vectorised(vehicle), dt, u);
 /// ```
 ///
 /// For models whose propagate or predict is a template over the scalar, as automatic() needs it, and neither

@@ -36,6 +36,19 @@ enum class AlignmentStatus {
   mirrored    ///< a reflection fits far better than any rotation; the best rotation is returned
 };
 
+/// The status as a sentence for a log.
+[[nodiscard]] constexpr const char* explain(AlignmentStatus status) noexcept {
+  switch (status) {
+    case AlignmentStatus::good:
+      return "good";
+    case AlignmentStatus::ambiguous:
+      return "ambiguous: fewer than three points, or points on a line, do not determine a rotation";
+    case AlignmentStatus::mirrored:
+      return "mirrored: a reflection fits far better than any rotation";
+  }
+  return "unknown status";
+}
+
 struct AlignmentOptions {
   bool with_scale = false;  ///< also estimate c; otherwise c = 1
   double tolerance = 1e-9;  ///< singular values below tolerance * s1 count as zero

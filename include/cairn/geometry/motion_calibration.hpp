@@ -57,6 +57,21 @@ enum class MotionCalibrationStatus {
   degenerate       ///< the motion is undetermined
 };
 
+/// The status as a sentence for a log.
+[[nodiscard]] constexpr const char* explain(MotionCalibrationStatus status) noexcept {
+  switch (status) {
+    case MotionCalibrationStatus::good:
+      return "good";
+    case MotionCalibrationStatus::too_few_points:
+      return "not calibrated: too few points can be triangulated";
+    case MotionCalibrationStatus::no_consensus:
+      return "not calibrated: the points do not move as one rigid scene";
+    case MotionCalibrationStatus::degenerate:
+      return "not calibrated: the motion is undetermined";
+  }
+  return "unknown status";
+}
+
 /// Result. Unless good, state and covariance are those given and the motion is the guess.
 struct MotionCalibration {
   Vector<5> state;          ///< of the correction, see RigCorrection

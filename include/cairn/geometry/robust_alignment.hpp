@@ -48,6 +48,21 @@ struct RobustAlignmentOptions {
 
 enum class RobustAlignmentStatus { good, too_few_pairs, no_consensus, degenerate };
 
+/// The status as a sentence for a log.
+[[nodiscard]] constexpr const char* explain(RobustAlignmentStatus status) noexcept {
+  switch (status) {
+    case RobustAlignmentStatus::good:
+      return "good";
+    case RobustAlignmentStatus::too_few_pairs:
+      return "no motion: too few pairs";
+    case RobustAlignmentStatus::no_consensus:
+      return "no motion: not enough pairs agree with any";
+    case RobustAlignmentStatus::degenerate:
+      return "no motion: the pairs that agree leave a direction undetermined";
+  }
+  return "unknown status";
+}
+
 /// Result. Unless good, the motion is the identity, and covariance and information are zero.
 struct RobustAlignment {
   SE3 T_target_source;

@@ -42,6 +42,21 @@ enum class StereoPoseStatus {
   degenerate        ///< the inliers leave a direction of the pose undetermined
 };
 
+/// The status as a sentence for a log.
+[[nodiscard]] constexpr const char* explain(StereoPoseStatus status) noexcept {
+  switch (status) {
+    case StereoPoseStatus::good:
+      return "good";
+    case StereoPoseStatus::too_few_matches:
+      return "no pose: too few matches";
+    case StereoPoseStatus::no_consensus:
+      return "no pose: not enough matches agree with any";
+    case StereoPoseStatus::degenerate:
+      return "no pose: the matches that agree leave a direction undetermined";
+  }
+  return "unknown status";
+}
+
 /// Result. Unless good, the pose is the prior's or the identity, and covariance and information are zero.
 struct StereoPose {
   SE3 T_world_camera;                         ///< pose of the left camera in the landmarks' frame

@@ -40,6 +40,23 @@ enum class TriangulationStatus {
   gap_too_large  ///< the rays pass each other by more than max_gap sigmas: not the same point
 };
 
+/// The status as a sentence for a log.
+[[nodiscard]] constexpr const char* explain(TriangulationStatus status) noexcept {
+  switch (status) {
+    case TriangulationStatus::good:
+      return "good";
+    case TriangulationStatus::no_ray:
+      return "no point: a pixel is not finite or outside the domain of its camera";
+    case TriangulationStatus::parallel:
+      return "no point: the rays are too nearly parallel to tell the depth";
+    case TriangulationStatus::behind:
+      return "no point: the rays meet behind a camera or outside the range of depths";
+    case TriangulationStatus::gap_too_large:
+      return "no point: the rays pass each other by more than the noise allows";
+  }
+  return "unknown status";
+}
+
 struct TriangulationOptions {
   TriangulationMethod method = TriangulationMethod::gauss_newton;
   double sigma_left = 0.5, sigma_right = 0.5;  ///< pixel noise in each coordinate [pixels]

@@ -47,7 +47,7 @@ double distance_from_kalman(const SigmaPoints& points, int updates, bool by_step
       const Vector<M, S> z = cairn_test::random_matrix<M, 1, S>(random);
       const auto expected = Kalman{}.update(exact, p.sensor, z);
       const auto found =
-          by_step ? filter.step(belief, p.process, {}, 1.0, p.sensor, z) : filter.update(belief, p.sensor, z);
+          by_step ? filter.step(belief, p.process, 1.0, p.sensor, z) : filter.update(belief, p.sensor, z);
       REQUIRE(found.accepted());
       worst = std::max(worst, relative_error(found.covariance, expected.covariance));
     }
@@ -103,7 +103,7 @@ TEST_SUITE("augmented_unscented") {
     for (int k = 0; k < 3; ++k) {
       REQUIRE(filter.predict(belief, process, 1.0) == Status::accepted);
       REQUIRE(filter.update(belief, sensor, Vector<1>(k + 1.0)).accepted());
-      REQUIRE(filter.step(extended, process, {}, 1.0, sensor, Vector<1>(k + 1.0)).accepted());
+      REQUIRE(filter.step(extended, process, 1.0, sensor, Vector<1>(k + 1.0)).accepted());
     }
     for (const auto& b : {belief, extended}) {
       CHECK((b.mean - Vector<2>(6.71906243764755, 1.52810614201467)).norm() < 2e-8);
@@ -121,8 +121,8 @@ TEST_SUITE("augmented_unscented") {
       const double beta = alpha * alpha;  // the term of m m^T speaks of the centre: equal only to O(m)
       const AugmentedUnscented a{.points = {.alpha = alpha, .beta = beta, .kappa = 0.5}};
       const cairn::Unscented b{.points = {.alpha = alpha, .beta = beta, .kappa = 3.5}};
-      REQUIRE(a.predict(augmented, process, Vector<2>(2, 1), 0.7) == Status::accepted);
-      REQUIRE(b.predict(additive, process, Vector<2>(2, 1), 0.7) == Status::accepted);
+      REQUIRE(a.predict(augmented, process, 0.7, Vector<2>(2, 1)) == Status::accepted);
+      REQUIRE(b.predict(additive, process, 0.7, Vector<2>(2, 1)) == Status::accepted);
       CHECK(cairn::local(augmented.mean, additive.mean).norm() < 1e-9);
       CHECK(relative_error(augmented.covariance, additive.covariance) < 1e-9);
     }
@@ -135,7 +135,7 @@ TEST_SUITE("augmented_unscented") {
     const Gaussian<SE2> prior{SE2(0, 0, 0.5), Vector<3>(0.01, 0.02, 0.04).asDiagonal()};
     const Vector<2> u(3.0, 0.5);
     Gaussian<SE2> belief = prior;
-    REQUIRE(AugmentedUnscented{}.predict(belief, Slipping{}, u, 1.0) == Status::accepted);
+    REQUIRE(AugmentedUnscented{}.predict(belief, Slipping{}, 1.0, u) == Status::accepted);
     constexpr int count = 40000;
     Vector<3> mean = Vector<3>::Zero();
     Matrix<3> square = Matrix<3>::Zero();
@@ -167,9 +167,9 @@ TEST_SUITE("augmented_unscented") {
           truth = Slipping{}.propagate(truth, u, Vector<2>(w0, w1), 1.0);
           const Vector<1> z = Echo{}.predict(truth, Vector<1>(random.normal(0.0, 0.02)));
           if (by_step) {
-            REQUIRE(filter.step(belief, Slipping{}, u, 1.0, Echo{}, z).accepted());
+            REQUIRE(filter.step(belief, Slipping{}, 1.0, Echo{}, z, u).accepted());
           } else {
-            REQUIRE(filter.predict(belief, Slipping{}, u, 1.0) == Status::accepted);
+            REQUIRE(filter.predict(belief, Slipping{}, 1.0, u) == Status::accepted);
             REQUIRE(filter.update(belief, Echo{}, z).accepted());
           }
         }
@@ -189,14 +189,14 @@ TEST_SUITE("augmented_unscented") {
     const Vector<1> z(0.0);
     const AugmentedUnscented filter{};
     CHECK(filter.predict(belief, p.process, -1) == Status::bad_time_step);
-    CHECK(filter.step(belief, p.process, {}, nan, p.sensor, z).status == Status::bad_time_step);
+    CHECK(filter.step(belief, p.process, nan, p.sensor, z).status == Status::bad_time_step);
     CHECK(AugmentedUnscented{.points = {.kappa = -4}}.predict(belief, p.process, 1) == Status::bad_option);
     CHECK(AugmentedUnscented{.fading = 0.9}.predict(belief, p.process, 1) == Status::bad_option);
     CHECK(AugmentedUnscented{.gate = 0}.update(belief, p.sensor, z).status == Status::bad_option);
     CHECK(AugmentedUnscented{.gate = 1e-9}.update(belief, p.sensor, Vector<1>(90.0)).status == Status::gated);
-    CHECK(AugmentedUnscented{.gate = 1e-9}.step(belief, p.process, {}, 1, p.sensor, Vector<1>(90.0)).status ==
+    CHECK(AugmentedUnscented{.gate = 1e-9}.step(belief, p.process, 1, p.sensor, Vector<1>(90.0)).status ==
           Status::gated);
-    CHECK(AugmentedUnscented{.stabilising_noise = 1}.step(belief, p.process, {}, 1, p.sensor, z).status ==
+    CHECK(AugmentedUnscented{.stabilising_noise = 1}.step(belief, p.process, 1, p.sensor, z).status ==
           Status::bad_option);
     CHECK(filter.update(belief, p.sensor, Vector<1>(nan)).status == Status::not_finite);
     auto broken = p;
@@ -204,21 +204,21 @@ TEST_SUITE("augmented_unscented") {
     broken.sensor.covariance(0, 0) = INFINITY;
     CHECK(filter.predict(belief, broken.process, 1) == Status::not_finite);
     CHECK(filter.update(belief, broken.sensor, z).status == Status::not_finite);
-    CHECK(filter.step(belief, p.process, {}, 1, broken.sensor, z).status == Status::not_finite);
+    CHECK(filter.step(belief, p.process, 1, broken.sensor, z).status == Status::not_finite);
     broken.sensor.covariance = -Matrix<1>::Identity();
     CHECK(filter.update(belief, broken.sensor, z).status == Status::not_positive_definite);
-    CHECK(filter.step(belief, p.process, {}, 1, broken.sensor, z).status == Status::not_positive_definite);
+    CHECK(filter.step(belief, p.process, 1, broken.sensor, z).status == Status::not_positive_definite);
     CHECK(belief.mean == p.prior.mean);
     CHECK(belief.covariance == p.prior.covariance);
     {
       const cairn_test::NoAllocation guard;
       CHECK(filter.predict(belief, p.process, 1) == Status::accepted);
       CHECK(filter.update(belief, p.sensor, z).accepted());
-      CHECK(filter.step(belief, p.process, {}, 1, p.sensor, z).accepted());
+      CHECK(filter.step(belief, p.process, 1, p.sensor, z).accepted());
     }
     belief.covariance(0, 0) = -1;
     CHECK(filter.predict(belief, p.process, 1) == Status::not_positive_definite);
-    CHECK(filter.step(belief, p.process, {}, 1, p.sensor, z).status == Status::not_positive_definite);
+    CHECK(filter.step(belief, p.process, 1, p.sensor, z).status == Status::not_positive_definite);
   }
 }
 

@@ -126,7 +126,7 @@ TEST_SUITE("joint_memory") {
     const JointExtended filter{};
     const Vector<2> u(1, 0.1);
     const auto everything = [&](int i) {
-      REQUIRE(filter.predict(scene.belief, cairn::Unicycle{}, u, 0.1, scene.robot) == Status::accepted);
+      REQUIRE(filter.predict(scene.belief, cairn::Unicycle{}, 0.1, u, scene.robot) == Status::accepted);
       REQUIRE(filter
                   .update(scene.belief, Sighting{}, scene.seen(i), scene.robot,
                           scene.landmarks[static_cast<std::size_t>(i)])
@@ -204,7 +204,7 @@ TEST_SUITE("joint_memory") {
       static_cast<void>(b.augment(cairn::inverted(Sighting{}), Sighting::measurement(3, 0.1), robot));
     });
     fails_cleanly("predict", [&](Belief& b) {
-      static_cast<void>(filter.predict(b, cairn::Unicycle{}, Vector<2>(1, 0.1), 0.5, robot));
+      static_cast<void>(filter.predict(b, cairn::Unicycle{}, 0.5, Vector<2>(1, 0.1), robot));
     });
     fails_cleanly("update",
                   [&](Belief& b) { static_cast<void>(filter.update(b, Sighting{}, z, robot, landmark)); });
