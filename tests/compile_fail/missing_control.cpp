@@ -5,4 +5,6 @@
 
 #include "models.hpp"
 
-auto step(Belief& belief, const Process& process) { return cairn::Kalman{}.predict(belief, process, 1.0); }
+auto step(Belief& belief, const Process& process) {
+  return cairn::Kalman{}.predict(belief, process, 1.0);
+}
