@@ -32,7 +32,7 @@ struct NavigatorStep {
 
 struct NavigatorOptions {
   cairn::PatchFilter filter{.iterations = 6, .free_bias = true, .free_gain = true, .gate = 4.0};
-  cairn::SearchOptions search{};
+  cairn::CorrelationSearchOptions search{};
   int frames_until_lost = 3;              ///< refused in a row
   double sigma_until_lost = 90;           ///< of the position, where Gauss-Newton steps no longer reach [m]
   double smallest_radius = 400;           ///< of a search [m]
@@ -93,7 +93,7 @@ private:
   }
 
   void search(std::span<const double> z, double heading, NavigatorStep& step) {
-    cairn::SearchOptions options = options_.search;
+    cairn::CorrelationSearchOptions options = options_.search;
     options.radius = std::max(options_.smallest_radius, 3.0 * sigma());
     const cairn::Vector<7> s = belief_.covariance.diagonal().cwiseSqrt();
     options.scale_sigma = std::max(s(4) / belief_.mean(4), s(5) / belief_.mean(5));

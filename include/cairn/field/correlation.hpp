@@ -74,7 +74,7 @@ enum class FixVerdict {
   return "unknown verdict";
 }
 
-struct SearchOptions {
+struct CorrelationSearchOptions {
   double radius = 1000;               ///< half side of the square region of shifts, > 0 [m]
   std::vector<double> headings{0.0};  ///< offsets added to the heading of the guess [rad]
   std::vector<double> scales{1.0};    ///< factors on both scales of the guess
@@ -154,7 +154,7 @@ inline void judge(Fix& fix, const Plane& surface, int column, int row, double ex
 
 template <FieldInterpolant Map>
 BankPeak search_bank(const Map& map, const PatchShape& shape, const Plane& patch, const PatchPlacement& guess,
-                     const SearchOptions& options, int reach_along, int reach_across, Fix& fix) {
+                     const CorrelationSearchOptions& options, int reach_along, int reach_across, Fix& fix) {
   BankPeak best;
   best.all = Plane(2 * reach_along + 1, 2 * reach_across + 1, nothing);
   for (std::size_t h = 0; h < options.headings.size(); ++h)
@@ -187,7 +187,7 @@ inline double sample_spacing(const PatchPlacement& p) noexcept {
 template <FieldInterpolant Map>
 void refine(Fix& fix, const Map& map, const PatchShape& shape, std::span<const double> z,
             const BankPeak& best, int reach_along, int reach_across, bool interior,
-            const SearchOptions& options) {
+            const CorrelationSearchOptions& options) {
   double a = best.column - reach_along, b = reach_across - best.row;  // samples from the guess
   if (interior) {
     const Vector<2> vertex = paraboloid_vertex(best.surface, best.column, best.row);
@@ -215,7 +215,7 @@ inline double worst_sigma(const Fix& fix) {
   return std::sqrt(largest) / sample_spacing(fix.placement);
 }
 
-inline FixVerdict verdict_of(const Fix& fix, bool interior, const SearchOptions& options) {
+inline FixVerdict verdict_of(const Fix& fix, bool interior, const CorrelationSearchOptions& options) {
   if (fix.peak < options.weakest_peak) return FixVerdict::weak;
   if (!interior) return FixVerdict::at_rim;
   const bool white = std::abs(fix.residual_correlation) < options.white_below;
@@ -233,7 +233,8 @@ inline FixVerdict verdict_of(const Fix& fix, bool interior, const SearchOptions&
 /// with n the samples of region and patch; one surface a member of the bank.
 template <FieldInterpolant Map>
 [[nodiscard]] Fix correlation_search(const Map& map, const PatchShape& shape, std::span<const double> z,
-                                     const PatchPlacement& guess, const SearchOptions& options = {}) {
+                                     const PatchPlacement& guess,
+                                     const CorrelationSearchOptions& options = {}) {
   CAIRN_EXPECTS(z.size() == shape.size(), "correlation_search needs one number a sample of the patch");
   CAIRN_EXPECTS(options.radius > 0.0 && !options.headings.empty() && !options.scales.empty(),
                 "correlation_search needs a positive radius and a bank of at least one heading and scale");
