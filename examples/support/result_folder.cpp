@@ -62,6 +62,17 @@ std::optional<cairn::detail::Descriptor> locked(const fs::path& folder) {
   return opened;
 }
 
+/// The turn of this run to change what stands in a folder: a lock on it, waited for, of the folder that has
+/// the name now and not of one that another run has just put aside. Not held where the folder cannot be
+/// opened.
+cairn::detail::Descriptor turn_in(const fs::path& folder) {
+  for (;;) {
+    cairn::detail::Descriptor opened(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (!opened || ::flock(opened.number(), LOCK_EX) != 0 || cairn::detail::leads_to(folder, opened))
+      return opened;
+  }
+}
+
 /// Removes the results and their parts in a folder, and the folder. What else has got into it goes to
 /// `others`, where it came from.
 void dissolve(const fs::path& folder, const Names& names, const fs::path& others) {
@@ -239,6 +250,7 @@ void ResultFolder::prepare() const {
   if (failure) refuse_folder(folder_, failure.message());
   if (!fs::is_directory(folder_)) refuse_folder(folder_, "not a folder");
   const fs::path folder = resolved(folder_);
+  const cairn::detail::Descriptor turn = turn_in(folder);
   recover(folder, names_);
   for (const std::string& name : names_)
     if (fs::is_directory(folder / name, failure))
@@ -249,8 +261,11 @@ void ResultFolder::prepare() const {
 void ResultFolder::replace(const std::function<void(const fs::path& staging)>& fill) const {
   prepare();
   const fs::path folder = resolved(folder_);
+  // What is begun inside the folder is begun while nobody exchanges it.
+  std::optional<cairn::detail::Descriptor> turn = turn_in(folder);
   const bool swaps = may_be_exchanged(folder, names_);
   Staging staging(folder, names_, swaps);
+  turn.reset();
   fill(staging.path());
   for (const fs::path& made : entries(staging.path()))
     CAIRN_EXPECTS(is_result(made.filename().string(), names_), "a run leaves files of the names it gave");
@@ -258,10 +273,8 @@ void ResultFolder::replace(const std::function<void(const fs::path& staging)>& f
     std::error_code failure;
     if (fs::exists(staging.path() / name, failure)) keep_permissions(folder / name, staging.path() / name);
   }
+  turn = turn_in(folder);  // two runs do not deliver into one folder at a time, nor exchange it meanwhile
   if (swaps && may_be_exchanged(folder, names_) && staging.exchange()) return;
-  // Two runs do not deliver into one folder at a time.
-  const cairn::detail::Descriptor turn(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
-  if (turn) static_cast<void>(::flock(turn.number(), LOCK_EX));
   if (fs::exists(folder / complete_inside)) deliver(folder / complete_inside, folder, names_);
   staging.complete();
   deliver(folder / complete_inside, folder, names_);
