@@ -262,10 +262,10 @@ void ResultFolder::replace(const std::function<void(const fs::path& staging)>& f
   prepare();
   const fs::path folder = resolved(folder_);
   // What is begun inside the folder is begun while nobody exchanges it.
-  std::optional<cairn::detail::Descriptor> turn = turn_in(folder);
+  cairn::detail::Descriptor turn = turn_in(folder);
   const bool swaps = may_be_exchanged(folder, names_);
   Staging staging(folder, names_, swaps);
-  turn.reset();
+  turn = cairn::detail::Descriptor();
   fill(staging.path());
   for (const fs::path& made : entries(staging.path()))
     CAIRN_EXPECTS(is_result(made.filename().string(), names_), "a run leaves files of the names it gave");
