@@ -34,6 +34,18 @@ struct Split {
   std::uint32_t axis;
 };
 
+/// How far apart two coordinates are, low <= high; of whole numbers too, whose difference may not fit their
+/// type.
+template <class Scalar>
+[[nodiscard]] constexpr auto reach(Scalar low, Scalar high) noexcept {
+  if constexpr (std::is_integral_v<Scalar>) {
+    using Whole = std::make_unsigned_t<Scalar>;
+    return static_cast<std::uint64_t>(static_cast<Whole>(static_cast<Whole>(high) - static_cast<Whole>(low)));
+  } else {
+    return high - low;
+  }
+}
+
 /// The axis along which whole points of a range reach farthest; the first of equals.
 template <class Record>
 [[nodiscard]] std::size_t farthest_axis(const Record* begin, const Record* end) {
@@ -61,7 +73,7 @@ template <class Record>
   }
   std::size_t widest = 0;
   for (std::size_t a = 1; a < low.size(); ++a)
-    if (high[a] - low[a] > high[widest] - low[widest]) widest = a;
+    if (reach(low[a], high[a]) > reach(low[widest], high[widest])) widest = a;
   return widest;
 }
 
