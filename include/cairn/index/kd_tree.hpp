@@ -210,12 +210,10 @@ private:
   /// Exact search for checked numbers.
   template <class C>
   void search_row(const Real* row, C& collector, Work& work) const {
-    if constexpr (Dim != dynamic_dim && Dim <= detail::few_axes)
-      search_boxes(row, collector, work);
-    else if (Dim == dynamic_dim && use_boxes())
-      search_boxes(row, collector, work);
-    else
-      search_splits(row, collector, work);
+    constexpr bool may_be_few = Dim == dynamic_dim || Dim <= detail::few_axes;
+    if constexpr (may_be_few)
+      if (Dim != dynamic_dim || use_boxes()) return search_boxes(row, collector, work);
+    if constexpr (!may_be_few || Dim == dynamic_dim) search_splits(row, collector, work);
   }
   template <class C>
   void search_boxes(const Real* row, C& collector, Work& work) const {

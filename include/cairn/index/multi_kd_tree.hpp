@@ -242,11 +242,11 @@ private:
   template <class C>
   void search_row(const Real* row, C& collector, Work& work) const {
     const std::span<const Tree* const> trees = forest_.trees();
-    if constexpr (Dim != dynamic_dim && Dim <= detail::few_axes)
-      detail::search_in_step(trees, row, collector, work);
-    else if (Dim == dynamic_dim && dimension() <= detail::few_axes)
-      detail::search_in_step(trees, row, collector, work);
-    else
+    constexpr bool may_be_few = Dim == dynamic_dim || Dim <= detail::few_axes;
+    if constexpr (may_be_few)
+      if (Dim != dynamic_dim || dimension() <= detail::few_axes)
+        return detail::search_in_step(trees, row, collector, work);
+    if constexpr (!may_be_few || Dim == dynamic_dim)
       for (std::size_t i = trees.size(); i-- > 0;)
         detail::TreeAccess::search_row(*trees[i], row, collector, work);
   }

@@ -88,7 +88,7 @@ template <int R, int C, class S, class A>
   } else {
     const bool fits = has_size(a, rows, columns);
     misfit = misfit || !fits;
-    return fits ? Matrix<R, C, S>(std::move(a)) : no_matrix<R, C, S>(rows, columns);
+    return fits ? Matrix<R, C, S>(std::forward<A>(a)) : no_matrix<R, C, S>(rows, columns);
   }
 }
 
