@@ -5,9 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
-#include <fstream>
 #include <map>
-#include <sstream>
 #include <string>
 #include <vector>
 
@@ -18,6 +16,7 @@
 #include <cairn/filter/joint_extended.hpp>
 #include <cairn/models/motion.hpp>
 
+#include "filter/mrclam.hpp"
 #include "filter/planar_slam.hpp"
 #include "support/data.hpp"
 #include "support/random.hpp"
@@ -101,22 +100,6 @@ Nees drive(cairn::Random& random, Mistake mistake) {
   return result;
 }
 
-// Rows of numbers until the first one later than `end`.
-std::vector<std::vector<double>> read_rows(const std::filesystem::path& path, double end) {
-  std::ifstream file(path);
-  std::vector<std::vector<double>> rows;
-  for (std::string line; std::getline(file, line);) {
-    if (line.empty() || line[0] == '#') continue;
-    std::istringstream words(line);
-    std::vector<double> row;
-    for (double value = 0; words >> value;) row.push_back(value);
-    if (row.size() < 2) continue;
-    if (row[0] > end) break;
-    rows.push_back(row);
-  }
-  return rows;
-}
-
 /// The motion that brings points nearest to others, least squares in the plane.
 SE2 rigid_fit(const std::vector<Vector<2>>& from, const std::vector<Vector<2>>& to) {
   Vector<2> a = Vector<2>::Zero(), b = Vector<2>::Zero();
@@ -147,29 +130,14 @@ struct Outcome {
 
 // The log of mrclam_test.cpp, but nothing is known of the landmarks but who they are.
 Outcome map_the_hall(const std::filesystem::path& folder, int robot_number) {
-  constexpr double begin = 1248446192.0, seconds = 400.0;
-  const std::string name = "Robot" + std::to_string(robot_number);
-  const auto truth = read_rows(folder / (name + "_Groundtruth.dat"), begin + seconds + 1);
-  const auto odometry = read_rows(folder / (name + "_Odometry.dat"), begin + seconds);
-  const auto sightings = read_rows(folder / (name + "_Measurement.dat"), begin + seconds);
-  std::map<int, int> subject_of;
-  for (const auto& row : read_rows(folder / "Barcodes.dat", 1e9))
-    subject_of[static_cast<int>(row[1])] = static_cast<int>(row[0]);
-  std::map<int, Vector<2>> true_landmarks;
-  for (const auto& row : read_rows(folder / "Landmark_Groundtruth.dat", 1e9))
-    true_landmarks[static_cast<int>(row[0])] = Vector<2>(row[1], row[2]);
-  std::size_t now = 0;
-  const auto truth_at = [&](double time) {
-    while (now + 1 < truth.size() && truth[now + 1][0] <= time) ++now;
-    return SE2(truth[now][1], truth[now][2], truth[now][3]);
-  };
-
+  constexpr double begin = cairn_test::MrclamRun::begin;
+  cairn_test::MrclamRun run(folder, robot_number);
   // the same noise as there
   const cairn::Unicycle process{.speed_density = 3e-3, .slip_density = 1e-4, .turn_density = 1e-2};
   const Sighting sensor{.range_sigma = 0.5, .bearing_sigma = 0.05};
   const JointExtended filter{.gate = cairn::chi_square_quantile(0.999, 2)};
   Slam belief;
-  const SE2 start = truth_at(begin);
+  const SE2 start = run.truth_at(begin);
   const auto robot = belief.add(start, 1e-6 * Matrix<3>::Identity()).id;
   SE2 dead = start;
   std::map<int, BlockId<Vector<2>>> landmarks;
@@ -185,11 +153,11 @@ Outcome map_the_hall(const std::filesystem::path& folder, int robot_number) {
   cairn::RunningMoments nees;
   std::vector<Vector<2>> path, true_path, dead_path;
   std::size_t next = 0;
-  for (const auto& row : odometry) {
-    for (; next < sightings.size() && sightings[next][0] <= row[0]; ++next) {
-      const auto& seen = sightings[next];
-      const auto subject = subject_of.find(static_cast<int>(seen[1]));
-      if (seen[0] < begin || subject == subject_of.end() || true_landmarks.count(subject->second) == 0)
+  for (const auto& row : run.odometry) {
+    for (; next < run.sightings.size() && run.sightings[next][0] <= row[0]; ++next) {
+      const auto& seen = run.sightings[next];
+      const auto subject = run.subject_of.find(static_cast<int>(seen[1]));
+      if (seen[0] < begin || subject == run.subject_of.end() || run.landmarks.count(subject->second) == 0)
         continue;
       move(seen[0]);
       const auto z = Sighting::measurement(seen[2], seen[3]);
@@ -207,7 +175,7 @@ Outcome map_the_hall(const std::filesystem::path& folder, int robot_number) {
     move(row[0]);
     control = Vector<2>(row[1], row[2]);
     if (row[0] < begin + 5.0) continue;
-    const SE2 is = truth_at(time);
+    const SE2 is = run.truth_at(time);
     path.push_back(belief.mean(robot).translation());
     true_path.push_back(is.translation());
     dead_path.push_back(dead.translation());
@@ -216,7 +184,7 @@ Outcome map_the_hall(const std::filesystem::path& folder, int robot_number) {
   std::vector<Vector<2>> map, true_map;
   for (const auto& [subject, id] : landmarks) {
     map.push_back(belief.mean(id));
-    true_map.push_back(true_landmarks[subject]);
+    true_map.push_back(run.landmarks[subject]);
   }
   const SE2 fit = rigid_fit(path, true_path);
   out.path = rms(path, true_path, SE2());

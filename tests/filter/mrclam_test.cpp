@@ -1,16 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 //
-// Robots in a hall (K. Leung et al., "The UTIAS multi-robot cooperative localization and mapping dataset",
-// IJRR 30, 2011): odometry, ranges and bearings to landmarks known to the centimetre, truth by Vicon.
+// Robots in a hall among known landmarks (mrclam.hpp).
+#include "filter/mrclam.hpp"
+
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
-#include <fstream>
-#include <map>
-#include <sstream>
-#include <string>
-#include <vector>
 
 #include <doctest/doctest.h>
 
@@ -30,22 +26,6 @@ using cairn::SE2;
 using cairn::Status;
 using cairn::Vector;
 
-// Rows of numbers until the first one later than `end`.
-std::vector<std::vector<double>> read_rows(const std::filesystem::path& path, double end) {
-  std::ifstream file(path);
-  std::vector<std::vector<double>> rows;
-  for (std::string line; std::getline(file, line);) {
-    if (line.empty() || line[0] == '#') continue;
-    std::istringstream words(line);
-    std::vector<double> row;
-    for (double value = 0; words >> value;) row.push_back(value);
-    if (row.size() < 2) continue;
-    if (row[0] > end) break;
-    rows.push_back(row);
-  }
-  return rows;
-}
-
 struct Outcome {
   double position_error = 0.0, heading_error = 0.0;  // root mean square
   double in_sight = 0.0;        // of the position, where a landmark was seen in the last second
@@ -54,32 +34,16 @@ struct Outcome {
   int sightings = 0, gated = 0;
 };
 
-constexpr double begin = 1248446192.0;
-constexpr double seconds = 400.0;
+constexpr double begin = cairn_test::MrclamRun::begin;
 
 template <class Filter>
 Outcome drive(const std::filesystem::path& folder, int robot, const Filter& filter) {
-  const std::string name = "Robot" + std::to_string(robot);
-  const auto truth = read_rows(folder / (name + "_Groundtruth.dat"), begin + seconds + 1);
-  const auto odometry = read_rows(folder / (name + "_Odometry.dat"), begin + seconds);
-  const auto sightings = read_rows(folder / (name + "_Measurement.dat"), begin + seconds);
-  std::map<int, int> subject_of;
-  for (const auto& row : read_rows(folder / "Barcodes.dat", 1e9))
-    subject_of[static_cast<int>(row[1])] = static_cast<int>(row[0]);
-  std::map<int, Vector<2>> landmarks;
-  for (const auto& row : read_rows(folder / "Landmark_Groundtruth.dat", 1e9))
-    landmarks[static_cast<int>(row[0])] = Vector<2>(row[1], row[2]);
-
-  std::size_t now = 0;
-  const auto truth_at = [&](double time) {
-    while (now + 1 < truth.size() && truth[now + 1][0] <= time) ++now;
-    return SE2(truth[now][1], truth[now][2], truth[now][3]);
-  };
+  cairn_test::MrclamRun run(folder, robot);
   // From sensors against truth: ranges err by 0.12 to 0.19 m, bearings by 0.01 to 0.08 rad, distance and turn
   // over 5 s by 0.04 m and 0.08 to 0.11 rad. These errors last, for seconds and longer, so that a reading is
   // worth less than its own sigma: about three times as much for all is what keeps NEES in its band.
   const cairn::Unicycle process{.speed_density = 3e-3, .slip_density = 1e-4, .turn_density = 1e-2};
-  Gaussian<SE2> belief{truth_at(begin), Vector<3>(1e-3, 1e-3, 1e-3).asDiagonal()};
+  Gaussian<SE2> belief{run.truth_at(begin), Vector<3>(1e-3, 1e-3, 1e-3).asDiagonal()};
   SE2 dead = belief.mean;
   Vector<2> control = Vector<2>::Zero();
   double time = begin;
@@ -93,14 +57,15 @@ Outcome drive(const std::filesystem::path& folder, int robot, const Filter& filt
   cairn::RunningMoments position, heading, in_sight, nees;
   double last_sighting = 0.0;
   std::size_t next = 0;
-  for (const auto& row : odometry) {
-    for (; next < sightings.size() && sightings[next][0] <= row[0]; ++next) {
-      const auto& seen = sightings[next];
-      const auto subject = subject_of.find(static_cast<int>(seen[1]));
-      if (seen[0] < begin || subject == subject_of.end() || landmarks.count(subject->second) == 0) continue;
+  for (const auto& row : run.odometry) {
+    for (; next < run.sightings.size() && run.sightings[next][0] <= row[0]; ++next) {
+      const auto& seen = run.sightings[next];
+      const auto subject = run.subject_of.find(static_cast<int>(seen[1]));
+      if (seen[0] < begin || subject == run.subject_of.end() || run.landmarks.count(subject->second) == 0)
+        continue;
       move(seen[0]);
       const cairn::RangeBearing sensor{
-          .beacon = landmarks[subject->second], .range_sigma = 0.5, .bearing_sigma = 0.05};
+          .beacon = run.landmarks[subject->second], .range_sigma = 0.5, .bearing_sigma = 0.05};
       const auto in = filter.update(belief, sensor, cairn::RangeBearing::measurement(seen[2], seen[3]));
       REQUIRE((in.accepted() || in.status == Status::gated));
       ++out.sightings;
@@ -110,7 +75,7 @@ Outcome drive(const std::filesystem::path& folder, int robot, const Filter& filt
     move(row[0]);
     control = Vector<2>(row[1], row[2]);
     if (row[0] < begin + 5.0) continue;
-    const SE2 is = truth_at(time);
+    const SE2 is = run.truth_at(time);
     const Vector<3> error = cairn::local(belief.mean, is);
     position.add(error.head<2>().squaredNorm());
     heading.add(error(2) * error(2));
@@ -119,7 +84,7 @@ Outcome drive(const std::filesystem::path& folder, int robot, const Filter& filt
   }
   out.position_error = std::sqrt(position.mean());
   out.heading_error = std::sqrt(heading.mean());
-  const Vector<3> drift = cairn::local(dead, truth_at(time));
+  const Vector<3> drift = cairn::local(dead, run.truth_at(time));
   out.in_sight = std::sqrt(in_sight.mean());
   out.odometry_error = drift.head<2>().norm();
   out.nees = nees.mean();

@@ -5,10 +5,7 @@
 // every bit is as before.
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cstddef>
-#include <cstdlib>
-#include <new>
 #include <utility>
 #include <vector>
 
@@ -19,41 +16,8 @@
 #include <cairn/models/motion.hpp>
 
 #include "filter/planar_slam.hpp"
+#include "support/failing_memory.hpp"
 #include "support/random.hpp"
-
-namespace {
-
-std::atomic<long> allocations_left{-1};  ///< negative: no end
-
-void* taken(std::size_t size, std::size_t alignment) {
-  if (allocations_left.load() >= 0 && allocations_left.fetch_sub(1) <= 0) throw std::bad_alloc();
-  void* memory =
-      std::aligned_alloc(alignment, (std::max<std::size_t>(size, 1) + alignment - 1) / alignment * alignment);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-
-}  // namespace
-
-// Never inlined: gcc 12, seeing one half of a pair, takes it for a mismatch.
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  return taken(size, 16);
-}
-[[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t alignment) {
-  return taken(size, static_cast<std::size_t>(alignment));
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory, std::align_val_t) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
-  std::free(memory);
-}
 
 namespace joint_memory_test {
 namespace {
@@ -66,24 +30,10 @@ using cairn::Matrix;
 using cairn::SE2;
 using cairn::Status;
 using cairn::Vector;
+using cairn_test::enough;
 using cairn_test::Sighting;
 
 using Belief = JointGaussian<SE2, Vector<2>>;
-
-/// Runs with so many allocations and no more; false where they were not enough.
-template <class Run>
-bool enough(long allowed, Run&& run) {
-  bool done = false;
-  allocations_left = allowed;
-  try {
-    run();
-    done = true;
-  } catch (const std::bad_alloc&) {
-    done = false;
-  }
-  allocations_left = -1;
-  return done;
-}
 
 std::vector<double> numbers(const Belief& belief) {
   std::vector<double> all{double(belief.size()), double(belief.dof())};

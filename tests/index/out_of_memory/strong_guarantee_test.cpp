@@ -4,10 +4,7 @@
 // Every allocation of every operation fails once: what was there before is there afterwards.
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cstddef>
-#include <cstdlib>
-#include <new>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -20,64 +17,13 @@
 #include <cairn/index/packed_points.hpp>
 #include <cairn/index/tree_file.hpp>
 
+#include "support/failing_memory.hpp"
 #include "support/random.hpp"
 
 namespace {
 
-std::atomic<long> allocations_left{-1};  ///< negative: no end
-
-bool is_refused() noexcept {
-  return allocations_left.load() >= 0 && allocations_left.fetch_sub(1) <= 0;
-}
-
-void* taken(std::size_t size, std::size_t alignment) {
-  if (is_refused()) throw std::bad_alloc();
-  void* memory =
-      std::aligned_alloc(alignment, (std::max<std::size_t>(size, 1) + alignment - 1) / alignment * alignment);
-  if (memory == nullptr) throw std::bad_alloc();
-  return memory;
-}
-
-}  // namespace
-
-// Never inlined: gcc 12, seeing one half of a pair, takes it for a mismatch.
-[[gnu::noinline]] void* operator new(std::size_t size) {
-  return taken(size, 16);
-}
-[[gnu::noinline]] void* operator new(std::size_t size, std::align_val_t alignment) {
-  return taken(size, static_cast<std::size_t>(alignment));
-}
-[[gnu::noinline]] void operator delete(void* memory) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory, std::align_val_t) noexcept {
-  std::free(memory);
-}
-[[gnu::noinline]] void operator delete(void* memory, std::size_t, std::align_val_t) noexcept {
-  std::free(memory);
-}
-
-namespace {
-
+using cairn_test::enough;
 using Point = std::array<float, 3>;
-
-/// Runs with so many allocations and no more; false where they were not enough.
-template <class Run>
-bool enough(long allowed, Run&& run) {
-  bool done = false;
-  allocations_left = allowed;
-  try {
-    run();
-    done = true;
-  } catch (const std::bad_alloc&) {
-    done = false;
-  }
-  allocations_left = -1;
-  return done;
-}
 
 std::vector<Point> random_points(std::size_t count, cairn::Random& random) {
   std::vector<Point> points(count);
@@ -300,7 +246,7 @@ TEST_SUITE("out_of_memory") {
       try {
         done = enough(steps, [&] { loaded = cairn::load_tree<cairn::KdTree<float, 3>>(in, "memory"); });
       } catch (const cairn::Error&) {
-        allocations_left = -1;  // the stream may say that it is broken
+        cairn_test::allocations_left = -1;  // the stream may say that it is broken
       }
       CHECK(loaded.size() == (done ? 60 : 0));
     }
