@@ -305,8 +305,9 @@ struct InformationFilter {
     root = transposed<n, n, S>(root);
     status = detail::predict_root<n, S>(root, b, f, q, fading);
     if (status != Status::accepted) return status;
-    next.information = detail::squared_root<n, S>(transposed<n, n, S>(root));
-    next.vector = detail::column_product(transposed<n, n, S>(root), b);
+    root = transposed<n, n, S>(root);
+    next.information = detail::squared_root<n, S>(root);
+    next.vector = detail::column_product(root, b);
     next.point = plain.propagate(next.point, dt);
     if (plain.misfit()) return Status::size_mismatch;
     return keep(belief, next);

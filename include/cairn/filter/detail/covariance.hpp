@@ -44,11 +44,12 @@ template <int N, class S, class Keep>
   return regular;
 }
 
-/// Symmetric `a` is finite and positive semi-definite up to the rounding of its own diagonal.
+/// Every pivot is well above rounding; uses up `work`.
 template <int N, class S>
 [[gnu::always_inline]] [[nodiscard]] inline bool is_regular(Column<N, S> (&work)[N]) {
   return eliminate_regular(work, [](int, const Column<N, S>&, const S&) {});
 }
+/// Symmetric `a` is finite and positive semi-definite up to the rounding of its own diagonal.
 template <int N, class S>
 [[nodiscard]] inline bool is_covariance(const Matrix<N, N, S>& a) {
   Column<N, S> work[N];
