@@ -13,6 +13,7 @@
 
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 #include <cairn/core/linalg.hpp>
 #include <cairn/version.hpp>
@@ -32,6 +33,38 @@ inline constexpr S digits_left = S(4096) * std::numeric_limits<S>::epsilon();
 template <class S>
 inline constexpr S root_digits_left = S(1024) * std::numeric_limits<S>::epsilon();
 
+/// A matrix kept by columns somewhere, of sizes known at run time: what is rarely needed works on views and
+/// is compiled once for all sizes.
+template <class S>
+class View {
+public:
+  View(S* data, int rows, int cols) : data_(data), rows_(rows), cols_(cols) {}
+  [[nodiscard]] int rows() const noexcept { return rows_; }
+  [[nodiscard]] int cols() const noexcept { return cols_; }
+  S& operator()(int i, int j) const { return data_[j * rows_ + i]; }
+  S& operator()(int i) const { return data_[i]; }
+
+private:
+  S* data_;
+  int rows_, cols_;
+};
+template <int R, int C, class S>
+[[nodiscard]] View<S> view(Matrix<R, C, S>& a) {
+  return {a.data(), static_cast<int>(a.rows()), static_cast<int>(a.cols())};
+}
+template <int R, int C, class S>
+[[nodiscard]] View<const S> view(const Matrix<R, C, S>& a) {
+  return {a.data(), static_cast<int>(a.rows()), static_cast<int>(a.cols())};
+}
+
+/// Room for rows x cols numbers of any value.
+template <int R, int C, class S>
+[[nodiscard]] Matrix<R, C, S> room(int rows, int cols) {
+  Matrix<R, C, S> result;
+  if constexpr (R == dynamic || C == dynamic) result.resize(rows, cols);
+  return result;
+}
+
 /// root root^T = a for a covariance of any rank: one column for each direction with variance, zeros after
 /// them. Not triangular, but row order(k), the k-th pivot, has nothing after column k.
 template <int N, class S>
@@ -41,63 +74,74 @@ struct PivotedRoot {
   int rank = 0;
 };
 
-/// Fills `result` from a symmetric `a`, whose lower triangle is read. False, and no use, where that is not
-/// finite or not positive semi-definite up to the rounding of its own diagonal. O(N^3 / 3).
+/// Fills `root` and `order` from a symmetric `a`, whose lower triangle is read and used up, and returns the
+/// rank; -1, and no use, where that is not finite or not positive semi-definite up to the rounding of its own
+/// diagonal. `sigma` and `waits` are room for a number a row. O(n^3 / 3).
+template <class S>
+[[nodiscard, gnu::cold, gnu::noinline]] int pivot_root(View<S> a, View<S> root, View<int> order,
+                                                       View<S> sigma, View<S> waits) {
+  using std::sqrt;
+  constexpr S slack = rounding_share<S>;
+  const int n = a.rows();
+  // What is still to be explained is kept in units of the standard deviations.
+  for (int i = 0; i < n; ++i) {
+    if (!(a(i, i) >= S(0)) || !(a(i, i) <= std::numeric_limits<S>::max())) return -1;
+    sigma(i) = sqrt(a(i, i));
+    waits(i) = S(1);  // 0 for a row that was a pivot
+    order(i) = 0;
+    for (int j = 0; j < n; ++j) root(i, j) = S(0);
+    for (int j = 0; j < i; ++j) {
+      const bool vary = sigma(i) > S(0) && sigma(j) > S(0);
+      if (vary) a(i, j) = a(i, j) / sigma(i) / sigma(j);
+      const S most = vary ? S(1) + slack : S(0);
+      if (!(a(i, j) <= most && a(i, j) >= -most)) return -1;
+    }
+  }
+  for (int i = 0; i < n; ++i) a(i, i) = sigma(i) > S(0) ? S(1) : S(0);
+  int rank = 0;
+  for (; rank < n; ++rank) {
+    int best = -1;
+    for (int i = 0; i < n; ++i)
+      if (waits(i) > S(0) && a(i, i) > (best < 0 ? slack : a(best, best))) best = i;
+    if (best < 0) break;
+    waits(best) = S(0);
+    order(rank) = best;
+    const S deviation = sqrt(a(best, best));
+    root(best, rank) = deviation;
+    for (int i = 0; i < n; ++i)
+      if (waits(i) > S(0)) root(i, rank) = (i > best ? a(i, best) : a(best, i)) / deviation;
+    for (int j = 0; j < n; ++j)
+      for (int i = j; i < n; ++i)
+        if (waits(i) > S(0) && waits(j) > S(0)) a(i, j) -= root(i, rank) * root(j, rank);
+  }
+  for (int j = 0; j < n; ++j)
+    for (int i = j; i < n; ++i)
+      if (waits(i) > S(0) && waits(j) > S(0) && !(a(i, j) >= S(-2) * slack && a(i, j) <= S(2) * slack))
+        return -1;
+  for (int j = 0; j < rank; ++j)
+    for (int i = 0; i < n; ++i) root(i, j) *= sigma(i);
+  return rank;
+}
+
+/// The same for a matrix. False where it is no covariance.
 template <int N, class S>
 [[nodiscard, gnu::cold, gnu::noinline]] bool pivoted_root(const Matrix<N, N, S>& a,
                                                           PivotedRoot<N, S>& result) {
-  using std::sqrt;
-  Matrix<N, N, S>& root = result.root;
-  constexpr S slack = rounding_share<S>;
   const int n = static_cast<int>(a.rows());
-  Matrix<N, N, S> left = a;  // what is still to be explained, in units of the standard deviations
-  Vector<N, S> sigma = Vector<N, S>::Zero(n);
-  Vector<N, S> waits = Vector<N, S>::Ones(n);  // 0 for a row that was a pivot
-  root = Matrix<N, N, S>::Zero(n, n);
-  result.order = Vector<N, int>::Zero(n);
-  for (int i = 0; i < n; ++i) {
-    if (!(a(i, i) >= S(0)) || !(a(i, i) <= std::numeric_limits<S>::max())) return false;
-    sigma(i) = sqrt(a(i, i));
-    left(i, i) = a(i, i) > S(0) ? S(1) : S(0);
-    for (int j = 0; j < i; ++j) {
-      const bool vary = a(i, i) > S(0) && a(j, j) > S(0);
-      left(i, j) = vary ? a(i, j) / sigma(i) / sigma(j) : a(i, j);
-      const S most = vary ? S(1) + slack : S(0);
-      if (!(left(i, j) <= most && left(i, j) >= -most)) return false;
-    }
-  }
-  const auto entry = [&](int i, int j) { return i > j ? left(i, j) : left(j, i); };
-  int k = 0;
-  for (; k < n; ++k) {
-    int best = -1;
-    for (int i = 0; i < n; ++i)
-      if (waits(i) > S(0) && left(i, i) > (best < 0 ? slack : left(best, best))) best = i;
-    if (best < 0) break;
-    waits(best) = S(0);
-    result.order(k) = best;
-    const S deviation = sqrt(left(best, best));
-    root(best, k) = deviation;
-    for (int i = 0; i < n; ++i)
-      if (waits(i) > S(0)) root(i, k) = entry(i, best) / deviation;
-    for (int j = 0; j < n; ++j)
-      for (int i = j; i < n; ++i)
-        if (waits(i) > S(0) && waits(j) > S(0)) left(i, j) -= root(i, k) * root(j, k);
-  }
-  result.rank = k;
-  for (int j = 0; j < n; ++j)
-    for (int i = j; i < n; ++i)
-      if (waits(i) > S(0) && waits(j) > S(0) && !(left(i, j) >= S(-2) * slack && left(i, j) <= S(2) * slack))
-        return false;
-  for (int j = 0; j < k; ++j)
-    for (int i = 0; i < n; ++i) root(i, j) *= sigma(i);
-  return true;
+  Matrix<N, N, S> left = a;
+  Vector<N, S> sigma = room<N, 1, S>(n, 1), waits = sigma;
+  result.root = a;
+  result.order = room<N, 1, int>(n, 1);
+  result.rank = pivot_root(view(left), view(result.root), view(result.order), view(sigma), view(waits));
+  return result.rank >= 0;
 }
 
 /// Householder: makes the C x R matrix `a` upper triangular in its first R rows, a^T a unchanged, diagonal
 /// not negative. C >= R. An error of rounding is one of each column by itself, so that columns may differ in
 /// size (Higham, 2002, theorem 19.4).
-template <int C, int R, class S>
-void triangularise(Matrix<C, R, S>& a) {
+template <class A>
+void triangularise(A&& a) {
+  using S = std::remove_cvref_t<decltype(a(0, 0))>;
   using std::sqrt;
   const int rows = static_cast<int>(a.rows());
   const int columns = static_cast<int>(a.cols());
@@ -156,30 +200,37 @@ void to_echelon(Matrix<C, R, S>& a, int count, Vector<N, int>& rows) {
   }
 }
 
-/// The transpose of the upper triangle of `array` that starts at (from, from).
+/// Fills `root` with the transpose of the upper triangle of `array` that starts at (from, from).
+template <class Root, class Array>
+void take_lower_part(Root&& root, const Array& array, int from) {
+  const std::remove_cvref_t<decltype(array(0, 0))> zero(0);
+  const int size = static_cast<int>(root.rows());
+  for (int j = 0; j < size; ++j)
+    for (int i = 0; i < size; ++i) root(i, j) = i < j ? zero : array(from + j, from + i);
+}
 template <class Root, class Array>
 [[nodiscard]] Root lower_part(const Array& array, int from, int size) {
   Root root = Root::Zero(size, size);
-  for (int j = 0; j < size; ++j)
-    for (int i = j; i < size; ++i) root(i, j) = array(from + j, from + i);
+  take_lower_part(root, array, from);
   return root;
 }
 
 /// Writes a^T into `array` from (row, column) on.
 template <class Array, class A>
-void put_transposed(Array& array, int row, int column, const A& a) {
+void put_transposed(Array&& array, int row, int column, const A& a) {
   for (int j = 0; j < static_cast<int>(a.cols()); ++j)
     for (int i = 0; i < static_cast<int>(a.rows()); ++i) array(row + j, column + i) = a(i, j);
 }
 
 /// Cholesky's factor where every pivot is well above the rounding of its row, else false: `lower` is of no
 /// use then.
-template <int N, class S>
-[[nodiscard]] bool regular_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& lower) {
+template <class A, class L>
+[[nodiscard]] bool eliminate_root(const A& a, L&& lower) {
+  using S = std::remove_cvref_t<decltype(lower(0, 0))>;
   using std::sqrt;
   const int n = static_cast<int>(a.rows());
-  lower = Matrix<N, N, S>::Zero(n, n);
   for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < j; ++i) lower(i, j) = S(0);
     for (int i = j; i < n; ++i) {
       S sum = a(i, j);
       for (int k = 0; k < j; ++k) sum -= lower(i, k) * lower(j, k);
@@ -192,6 +243,11 @@ template <int N, class S>
   }
   return true;
 }
+template <int N, class S>
+[[nodiscard]] bool regular_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& lower) {
+  lower = a;
+  return eliminate_root(a, lower);
+}
 
 /// Lower triangular root of any positive semi-definite `a`; false where it is none.
 template <int N, class S>
@@ -199,12 +255,20 @@ template <int N, class S>
   PivotedRoot<N, S> pivoted;
   if (!pivoted_root<N, S>(a, pivoted)) return false;
   Matrix<N, N, S> array = transposed<N, N, S>(pivoted.root);
-  triangularise(array);
-  root = lower_part<Matrix<N, N, S>>(array, 0, static_cast<int>(a.rows()));
+  root = a;
+  triangularise(view(array));
+  take_lower_part(view(root), view(array), 0);
   return true;
 }
 
-/// The same, the quick way first.
+/// The same, the quick way first; compiled once for all sizes.
+template <int N, class S>
+[[nodiscard]] bool rare_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& root) {
+  root = a;
+  return eliminate_root(view(a), view(root)) || singular_root<N, S>(a, root);
+}
+
+/// The same for what is done at every step.
 template <int N, class S>
 [[nodiscard]] bool dense_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& root) {
   return regular_root<N, S>(a, root) || singular_root<N, S>(a, root);

@@ -11,6 +11,7 @@
 
 #include <Eigen/Core>
 
+#include <cairn/simd/matrix_product.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
@@ -58,13 +59,35 @@ template <int R, int K, int C, class S, class Term>
 
 }  // namespace detail
 
+namespace detail {
+
+/// A B of run-time sizes (registers side by side, matrix_product.hpp). Numbers that are no float or double go
+/// the same way one by one.
+template <int R, int K, int C, class S>
+[[nodiscard]] Matrix<R, C, S> run_time_product(const Matrix<R, K, S>& a, const Matrix<K, C, S>& b) {
+  Matrix<R, C, S> result(a.rows(), b.cols());
+  multiply(a.data(), b.data(), result.data(), a.rows(), a.cols(), b.cols());
+  return result;
+}
+
+}  // namespace detail
+
+/// A^T, entry by entry: gcc 12 calls a matrix that is constructed from an Eigen transpose uninitialised.
+template <int R, int C, class S>
+[[nodiscard]] Matrix<C, R, S> transposed(const Matrix<R, C, S>& a) {
+  Matrix<C, R, S> result(a.cols(), a.rows());
+  for (Eigen::Index j = 0; j < a.cols(); ++j)
+    for (Eigen::Index i = 0; i < a.rows(); ++i) result(j, i) = a(i, j);
+  return result;
+}
+
 /// A B. This and the three below are plain loops, which the compiler unrolls where sizes are small: each
 /// shape of a product of Eigen's costs whoever includes it a tenth of a second of compiling, called or not,
-/// and of more than 8 rows half a second. Run-time sizes go through Eigen, whose blocks pay there. O(R K C).
+/// of more than 8 rows half a second, and of run-time sizes more than one. O(R K C).
 template <int R, int K, int C, class S>
 [[nodiscard]] Matrix<R, C, S> product(const Matrix<R, K, S>& a, const Matrix<K, C, S>& b) {
   if constexpr (R == dynamic || K == dynamic || C == dynamic)
-    return a * b;
+    return detail::run_time_product(a, b);
   else
     return detail::sums<R, K, C, S>([&](int r, int k, int c) { return a(r, k) * b(k, c); });
 }
@@ -73,7 +96,7 @@ template <int R, int K, int C, class S>
 template <int R, int K, int C, class S>
 [[nodiscard]] Matrix<R, C, S> transposed_product(const Matrix<K, R, S>& a, const Matrix<K, C, S>& b) {
   if constexpr (R == dynamic || K == dynamic || C == dynamic)
-    return a.transpose() * b;
+    return detail::run_time_product(transposed(a), b);
   else
     return detail::sums<R, K, C, S>([&](int r, int k, int c) { return a(k, r) * b(k, c); });
 }
@@ -82,7 +105,7 @@ template <int R, int K, int C, class S>
 template <int R, int K, int C, class S>
 [[nodiscard]] Matrix<R, C, S> product_transposed(const Matrix<R, K, S>& a, const Matrix<C, K, S>& b) {
   if constexpr (R == dynamic || K == dynamic || C == dynamic)
-    return a * b.transpose();
+    return detail::run_time_product(a, transposed(b));
   else
     return detail::sums<R, K, C, S>([&](int r, int k, int c) { return a(r, k) * b(c, k); });
 }
@@ -94,15 +117,6 @@ void add_transposed_product(Matrix<R, C, S>& to, const Matrix<K, R, S>& a, const
   const Matrix<R, C, S> sum = transposed_product(a, b);
   for (Eigen::Index c = 0; c < sum.cols(); ++c)
     for (Eigen::Index r = 0; r < sum.rows(); ++r) to(r, c) += weight * sum(r, c);
-}
-
-/// A^T, entry by entry: gcc 12 calls a matrix that is constructed from an Eigen transpose uninitialised.
-template <int R, int C, class S>
-[[nodiscard]] Matrix<C, R, S> transposed(const Matrix<R, C, S>& a) {
-  Matrix<C, R, S> result(a.cols(), a.rows());
-  for (Eigen::Index j = 0; j < a.cols(); ++j)
-    for (Eigen::Index i = 0; i < a.rows(); ++i) result(j, i) = a(i, j);
-  return result;
 }
 
 /// The R x C part of a matrix that begins at this row and column.

@@ -22,7 +22,7 @@ template <int R, int C, class S>
   if constexpr (R == dynamic || C == dynamic) {
     VectorOrNone<R, S> y;
     if (a.cols() != x.size() || (b.size() != 0 && b.size() != a.rows())) return y;
-    y.noalias() = a * x;
+    y = product(a, x);
     if (b.size() != 0) y += b;
     return y;
   } else {

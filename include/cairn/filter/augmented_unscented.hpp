@@ -340,12 +340,12 @@ private:
       for (int j = 0; j < ms; ++j)
         for (int k = count; k < all; ++k)
           in_z(j, j) += array(k, j) * array(k, j) + array(all + k, j) * array(all + k, j);
-      detail::triangularise(by_state);
+      detail::triangularise(detail::view(by_state));
       const CovarianceOf<X> root = detail::lower_part<CovarianceOf<X>>(by_state, 0, ns);
       const Matrix<m, n, S> slope = detail::mean_slope<m, n, S>(by_state, root, ms, ns);
-      update = detail::update_by_array<n, m, S>(array, in.residual, ns);
-      const bool good = update.regular && detail::determined<n, m, S>(update, root, slope, in_z,
-                                                                      detail::KeptAs::covariance, digits);
+      update = detail::update_by_array<n, m, S, detail::Wanted::rarely>(array, in.residual, ns);
+      const bool good = update.regular && detail::determined<n, m, S, detail::Wanted::rarely>(
+                                              update, root, slope, in_z, detail::KeptAs::covariance, digits);
       return good ? Status::accepted : Status::not_positive_definite;
     };
     detail::correct_by_moments<X, m, S>(belief, cross, in, gate, digits, by_array);

@@ -12,6 +12,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <span>
 #include <vector>
@@ -111,9 +112,11 @@ struct BatchKalman {
     const Matrix<N, N, S> q = detail::plain_matrix<N, N, S>(noise, N, N, misfit);
     if (misfit) return Status::size_mismatch;
     if (const Status status = detail::judge_noise<N, S>(q); status != Status::accepted) return status;
+    typename GaussianBatch<N, S>::Lane added[GaussianBatch<N, S>::triangle]{};
+    for (int i = 0; i < N; ++i)
+      for (int j = 0; j <= i; ++j) added[batch.place(i, j)] += q(i, j);
     for (auto& block : batch.blocks())
-      for (int i = 0; i < N; ++i)
-        for (int j = 0; j <= i; ++j) block.covariance[batch.place(i, j)] += q(i, j);
+      for (int k = 0; k < batch.triangle; ++k) block.covariance[k] += added[k];
     return Status::accepted;
   }
 
@@ -139,6 +142,16 @@ struct BlockVerdict {
   Mask good, doubtful;
 };
 
+/// Every bit of a mask is set.
+template <class Mask>
+[[gnu::always_inline]] [[nodiscard]] inline bool all_lanes(const Mask& mask) {
+  std::uint64_t words[sizeof(Mask) / sizeof(std::uint64_t)];
+  std::memcpy(words, &mask, sizeof(Mask));
+  std::uint64_t all = words[0];
+  for (const std::uint64_t word : words) all &= word;
+  return all == ~std::uint64_t(0);
+}
+
 /// One block: P and x with z and R.
 template <int N, class S>
 [[gnu::always_inline]] inline auto update_block(typename GaussianBatch<N, S>::Block& belief,
@@ -158,10 +171,11 @@ template <int N, class S>
   }
   constexpr S least = S(4) * digits_left<S>;
   Lane nis = y[0] * S(0);
-  auto good = nis == nis;
+  Lane in_s = lower[0][0];  // what is left of a pivot of S above its rounding; NaN shows in the NIS
   for (int m = 0; m < N; ++m) {
     pivot[m] = S(1) / lower[m][m];
-    good &= lower[m][m] > S(0);
+    const int place = Batch::place(m, m);
+    if (m > 0) in_s = lesser(in_s, lower[m][m] - (belief.covariance[place] + seen.covariance[place]) * least);
     nis += y[m] * y[m] * pivot[m];
     for (int i = m + 1; i < N; ++i) {
       const Lane factor = lower[i][m] * pivot[m];
@@ -170,12 +184,6 @@ template <int N, class S>
       for (int k = 0; k < N; ++k) w[i][k] -= factor * w[m][k];
     }
   }
-  auto sound = good;
-  for (int m = 1; m < N; ++m) {
-    const int place = Batch::place(m, m);
-    sound &= lower[m][m] >= (belief.covariance[place] + seen.covariance[place]) * least;
-  }
-  const auto taken = nis <= gate;
   typename Batch::Block next = belief;
   for (int m = 0; m < N; ++m)
     for (int i = 0; i < N; ++i) {
@@ -183,17 +191,21 @@ template <int N, class S>
       next.mean[i] += scaled * y[m];
       for (int j = 0; j <= i; ++j) next.covariance[Batch::place(i, j)] -= scaled * w[m][j];
     }
-  auto kept = sound;
-  for (int i = 0; i < N; ++i) {
-    kept &= next.covariance[Batch::place(i, i)] > belief.covariance[Batch::place(i, i)] * least;
-    good &= next.mean[i] - next.mean[i] == S(0);
+  Lane in_p = next.covariance[0] - belief.covariance[0] * least;  // and of a variance
+  Lane none = next.mean[0] * S(0);                                // NaN beside a mean that is not finite
+  for (int i = 1; i < N; ++i) {
+    const int place = Batch::place(i, i);
+    in_p = lesser(in_p, next.covariance[place] - belief.covariance[place] * least);
+    none += next.mean[i] * S(0);
   }
-  const auto doubtful = ~sound | (taken & ~kept);
-  good &= kept & taken;
+  const auto sound = in_s > S(0);
+  const auto kept = in_p > S(0);
+  const auto taken = nis <= gate;
+  const auto good = sound & kept & taken & (none == S(0));
   for (int i = 0; i < N; ++i) belief.mean[i] = good ? next.mean[i] : belief.mean[i];
   for (int i = 0; i < Batch::triangle; ++i)
     belief.covariance[i] = good ? next.covariance[i] : belief.covariance[i];
-  return BlockVerdict<decltype(good)>{good, doubtful};
+  return BlockVerdict<std::remove_const_t<decltype(good)>>{good, ~sound | (taken & ~kept)};
 }
 
 /// The filter of one lane alone.
@@ -226,6 +238,10 @@ std::size_t BatchKalman::update(GaussianBatch<N, S>& batch, const GaussianBatch<
     const auto verdict = detail::update_block<N, S>(batch.blocks()[b], seen.blocks()[b], limit);
     const std::size_t first = b * lanes;
     const std::size_t used = batch.size() - first < lanes ? batch.size() - first : lanes;
+    if (kept.empty() && used == lanes && detail::all_lanes(verdict.good)) [[likely]] {
+      count += lanes;
+      continue;
+    }
     for (std::size_t lane = 0; lane < used; ++lane) {
       bool good = verdict.good[lane] != 0;
       if (verdict.doubtful[lane] != 0) [[unlikely]]

@@ -140,7 +140,7 @@ struct EnsembleKalman {
     const Z expected = seen.mean();
     Matrix<m, dynamic, S> views(dof_of(expected), count);
     for (int i = 0; i < count; ++i) views.col(i) = local(expected, seen.members[static_cast<std::size_t>(i)]);
-    const Matrix<m, m, S> spread = views * views.transpose() / static_cast<S>(count - 1);
+    const Matrix<m, m, S> spread = product_transposed(views, views) / static_cast<S>(count - 1);
     auto in = detail::fresh_innovation<m, S>(local(expected, plain.z()), symmetrised(spread + r));
     in.nis = detail::squared_mahalanobis<m, S>(in.residual, in.covariance);
     Matrix<m, m, S> root = r;

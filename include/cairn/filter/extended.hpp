@@ -113,7 +113,7 @@ Status Extended::iterate(Gaussian<typename H::State>& belief, const detail::Plai
     if (sensor.misfit()) return Status::size_mismatch;
     if (!all_finite(h) || !all_finite(noise) || !all_finite(residual)) return Status::not_finite;
     Matrix<m, m, S> root_r = noise, white_r = noise;
-    if (!detail::checked_root<m, S>(noise, root_r)) return Status::not_positive_definite;
+    if (!detail::rare_root<m, S>(noise, root_r)) return Status::not_positive_definite;
     const bool has_cost = detail::regular_root<m, S>(noise, white_r);
     const Matrix<m, n, S> g = detail::column_product(h, root);
     Matrix<detail::size_sum<m, n>, detail::size_sum<m, n>, S> array(ms + ns, ms + ns);
@@ -121,13 +121,14 @@ Status Extended::iterate(Gaussian<typename H::State>& belief, const detail::Plai
     detail::put_transposed(array, 0, 0, root_r);
     detail::put_transposed(array, ms, 0, g);
     for (int i = 0; i < ns; ++i) array(ms + i, ms + i) = S(1);
-    auto update =
-        detail::update_by_array<n, m, S>(array, Vector<m, S>(residual + detail::column_product(g, u)), ns);
+    auto update = detail::update_by_array<n, m, S, detail::Wanted::rarely>(
+        array, Vector<m, S>(residual + detail::column_product(g, u)), ns);
     if (!update.regular || !all_finite(update.step)) return Status::not_positive_definite;
     updated = detail::column_product(root, update.root);
     update.white = detail::column_product(root, update.white);
     std::swap(update.root, updated);
-    if (!detail::determined<n, m, S>(update, root, h, noise, detail::KeptAs::covariance))
+    if (!detail::determined<n, m, S, detail::Wanted::rarely>(update, root, h, noise,
+                                                             detail::KeptAs::covariance))
       return Status::not_positive_definite;
     std::swap(update.root, updated);
     Tangent<X> change = update.step - u;

@@ -111,7 +111,7 @@ consteval auto identity_pattern(std::index_sequence<I...>) {
 /// Calls body(std::integral_constant<std::size_t, i>) for i in [0, Count).
 template <std::size_t Count, class Body>
 [[gnu::always_inline]] inline constexpr void unrolled(Body&& body) {
-  [&]<std::size_t... I>(std::index_sequence<I...>) {
+  [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
     (body(std::integral_constant<std::size_t, I>{}), ...);
   }(std::make_index_sequence<Count>{});
 }

@@ -199,7 +199,7 @@ private:
     using std::sqrt;
     Matrix<M, M, S> root_r = r;
     if (!all_finite(r) || !all_finite(h) || !all_finite(in.residual)) return Status::not_finite;
-    if (!detail::checked_root<M, S>(r, root_r)) return Status::not_positive_definite;
+    if (!detail::rare_root<M, S>(r, root_r)) return Status::not_positive_definite;
     Matrix<N, N, S> root = belief.upper;
     for (int j = 0; j < N; ++j)
       for (int i = 0; i < N; ++i) root(i, j) *= sqrt(belief.diagonal(j));
@@ -207,11 +207,11 @@ private:
     detail::put_transposed(array, 0, 0, root_r);
     detail::put_transposed(array, M, 0, detail::column_product(h, root));
     detail::put_transposed(array, M, M, root);
-    const auto update = detail::update_by_array<N, M, S>(array, in.residual, N);
+    const auto update = detail::update_by_array<N, M, S, detail::Wanted::rarely>(array, in.residual, N);
     constexpr double no_gate = std::numeric_limits<double>::infinity();
     const Status status = detail::judge_array(update, in, no_gate);
     if (status != Status::accepted) return status;
-    if (!detail::determined<N, M, S>(update, root, h, r, detail::KeptAs::root))
+    if (!detail::determined<N, M, S, detail::Wanted::rarely>(update, root, h, r, detail::KeptAs::root))
       return Status::not_positive_definite;
     Matrix<N, N, S> upper;
     Vector<N, S> diagonal;

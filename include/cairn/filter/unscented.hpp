@@ -86,10 +86,11 @@ void correct_by_moments(Gaussian<X>& belief, const Matrix<dof<X>, M, S>& cross, 
   const Cholesky<M, S> root(in.covariance);
   digits /= root.least_share();
   const bool sound = root.good() && digits < S(1);
-  const Matrix<M, n, S> w = root.whiten(Matrix<M, n, S>(cross.transpose()));  // S^-1/2 C^T
+  const Matrix<M, n, S> w = root.whiten(transposed(cross));  // S^-1/2 C^T
   const Vector<M, S> y = root.whiten(in.residual);
   in.nis = y.dot(y);
-  Candidate<n, M, S> out{in, w.transpose() * y, symmetrised(belief.covariance - w.transpose() * w)};
+  Candidate<n, M, S> out{in, transposed_product(w, y),
+                         symmetrised(belief.covariance - transposed_product(w, w))};
   if (!finite_state(belief.mean)) {
     in.status = gate > 0.0 ? Status::not_finite : Status::bad_option;
     return;
@@ -200,7 +201,7 @@ private:
       const int ns = static_cast<int>(belief.covariance.rows()), ms = static_cast<int>(in.residual.size());
       CovarianceOf<X> root = belief.covariance;
       Matrix<M, M, S> root_r = r;
-      if (!detail::checked_root<n, S>(belief.covariance, root) || !detail::checked_root<M, S>(r, root_r))
+      if (!detail::rare_root<n, S>(belief.covariance, root) || !detail::rare_root<M, S>(r, root_r))
         return Status::not_positive_definite;
       constexpr int rows = n == dynamic || M == dynamic ? dynamic : 2 * n + 1 + M;
       constexpr int size = detail::size_sum<M, n>;
@@ -212,9 +213,9 @@ private:
       detail::put_transposed(array, 2 * ns + 1, 0, root_r);
       if (!all_finite(array)) return Status::not_positive_definite;
       const Matrix<M, n, S> slope = detail::mean_slope<M, n, S>(array, root, ms);
-      update = detail::update_by_array<n, M, S>(array, in.residual, ns);
-      const bool good = update.regular && detail::determined<n, M, S>(update, root, slope, r,
-                                                                      detail::KeptAs::covariance, digits);
+      update = detail::update_by_array<n, M, S, detail::Wanted::rarely>(array, in.residual, ns);
+      const bool good = update.regular && detail::determined<n, M, S, detail::Wanted::rarely>(
+                                              update, root, slope, r, detail::KeptAs::covariance, digits);
       return good ? Status::accepted : Status::not_positive_definite;
     };
   }

@@ -56,7 +56,7 @@ struct ControlledLinearModel {
     } else {
       detail::VectorOrNone<N, S> next;
       const bool fits = transition.cols() == x.size() && input.cols() == u.size();
-      if (fits && transition.rows() == input.rows()) next = transition * x + input * u;
+      if (fits && transition.rows() == input.rows()) next = product(transition, x) + product(input, u);
       return next;
     }
   }

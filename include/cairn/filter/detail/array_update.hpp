@@ -14,6 +14,7 @@
 
 #include <cmath>
 #include <limits>
+#include <type_traits>
 
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
@@ -23,16 +24,21 @@
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
-/// root root^T, symmetric bit for bit.
-template <int N, class S>
-[[nodiscard]] Matrix<N, N, S> squared_root(const Matrix<N, N, S>& root) {
-  Matrix<N, N, S> a = root;
+/// a = root root^T, symmetric bit for bit.
+template <class Root, class A>
+void square(const Root& root, A&& a) {
+  using S = std::remove_cvref_t<decltype(a(0, 0))>;
   for (int j = 0; j < static_cast<int>(root.rows()); ++j)
     for (int i = j; i < static_cast<int>(root.rows()); ++i) {
       S sum(0);
       for (int k = 0; k < static_cast<int>(root.cols()); ++k) sum += root(i, k) * root(j, k);
       a(i, j) = a(j, i) = sum;
     }
+}
+template <int N, class S>
+[[nodiscard]] Matrix<N, N, S> squared_root(const Matrix<N, N, S>& root) {
+  Matrix<N, N, S> a = root;
+  square(root, a);
   return a;
 }
 
@@ -48,34 +54,83 @@ struct ArrayUpdate {
   bool regular = true;                                      ///< S has an inverse
 };
 
-/// Triangularises `array`, which is used up.
-template <int N, int M, class S, class Array>
-[[nodiscard]] ArrayUpdate<N, M, S> update_by_array(Array& array, const Vector<M, S>& residual, int n) {
+/// What an array's update comes to beside its matrices.
+template <class S>
+struct ArrayVerdict {
+  S nis = S(0), log_determinant = std::numeric_limits<S>::quiet_NaN();
+  bool regular = true;
+};
+
+/// Triangularises `array`, which is used up, and fills the parts. `y` is the residual, whitened on return.
+template <class Array, class RootS, class Root, class White, class Step, class Y>
+[[nodiscard]] auto read_array(Array&& array, RootS&& root_s, Root&& root, White&& white, Step&& step, Y&& y) {
+  using S = std::remove_cvref_t<decltype(array(0, 0))>;
   using std::log;
   using std::sqrt;
-  const int m = static_cast<int>(residual.size());
+  const int m = static_cast<int>(root_s.rows()), n = static_cast<int>(root.rows());
   triangularise(array);
-  ArrayUpdate<N, M, S> out{lower_part<Matrix<M, M, S>>(array, 0, m), lower_part<Matrix<N, N, S>>(array, m, n),
-                           Matrix<N, M, S>::Zero(n, m), Vector<N, S>::Zero(n)};
-  Vector<M, S> y = residual;
+  take_lower_part(root_s, array, 0);
+  take_lower_part(root, array, m);
+  ArrayVerdict<S> out;
   S log_root(0), least_share(1);
   for (int i = 0; i < m; ++i) {
     S variance(0);
-    for (int k = 0; k <= i; ++k) variance += out.root_s(i, k) * out.root_s(i, k);
-    for (int k = 0; k < i; ++k) y(i) -= out.root_s(i, k) * y(k);
-    const S head = out.root_s(i, i);
+    for (int k = 0; k <= i; ++k) variance += root_s(i, k) * root_s(i, k);
+    for (int k = 0; k < i; ++k) y(i) -= root_s(i, k) * y(k);
+    const S head = root_s(i, i);
     out.regular = out.regular && head > root_digits_left<S> * sqrt(variance);
     if (head * head < least_share * variance) least_share = head * head / variance;
     y(i) /= head;
+    out.nis += y(i) * y(i);
     if (out.regular) log_root += log(head);
   }
   if (least_share < digits_left<S>) out.log_determinant = S(2) * log_root;
-  out.nis = y.dot(y);
-  for (int i = 0; i < n; ++i)
+  for (int i = 0; i < n; ++i) {
+    step(i) = S(0);
     for (int k = 0; k < m; ++k) {
-      out.white(i, k) = array(k, m + i);
-      out.step(i) += out.white(i, k) * y(k);
+      white(i, k) = array(k, m + i);
+      step(i) += white(i, k) * y(k);
     }
+  }
+  return out;
+}
+
+/// [R^1/2  H L; 0  L]^T from H, L and R^1/2.
+template <class S>
+[[gnu::noinline]] void fill_array(View<S> array, View<const S> h, View<S> root, View<S> root_r) {
+  const int n = root.rows(), m = root_r.rows();
+  for (int j = 0; j < m + n; ++j)
+    for (int i = 0; i < m; ++i) array(i, j) = j < m ? root_r(j, i) : S(0);
+  for (int i = 0; i < n; ++i) {
+    for (int j = 0; j < m; ++j) {
+      S sum(0);
+      for (int k = 0; k < n; ++k) sum += h(j, k) * root(k, i);
+      array(m + i, j) = sum;
+    }
+    for (int j = 0; j < n; ++j) array(m + i, m + j) = root(j, i);
+  }
+}
+
+/// How often an update by an array is wanted: at every step of a filter, or where another has lost its
+/// digits; then it is compiled once for all sizes.
+enum class Wanted { always, rarely };
+
+/// Triangularises `array`, which is used up.
+template <int N, int M, class S, Wanted When = Wanted::always, class Array>
+[[nodiscard]] ArrayUpdate<N, M, S> update_by_array(Array& array, const Vector<M, S>& residual, int n) {
+  const int m = static_cast<int>(residual.size());
+  ArrayUpdate<N, M, S> out{room<M, M, S>(m, m), room<N, N, S>(n, n), room<N, M, S>(n, m),
+                           room<N, 1, S>(n, 1)};
+  Vector<M, S> y = residual;
+  ArrayVerdict<S> verdict;
+  if constexpr (When == Wanted::always)
+    verdict = read_array(array, out.root_s, out.root, out.white, out.step, y);
+  else
+    verdict =
+        read_array(view(array), view(out.root_s), view(out.root), view(out.white), view(out.step), view(y));
+  out.nis = verdict.nis;
+  out.log_determinant = verdict.log_determinant;
+  out.regular = verdict.regular;
   return out;
 }
 
@@ -85,41 +140,41 @@ enum class KeptAs { covariance, root };
 /// The update is determined by the numbers it came from: were each variance of P (or number of its root) and
 /// of R known to its last digit only, H x, z and x - K H x would still keep three digits of their deviations.
 /// Where differences of nearly equal numbers decide, it is not. `lower` is the prior's root, `digits` what
-/// the columns of the array need to have left. O(n^2 m).
-template <int N, int M, class S>
-[[nodiscard]] bool determined(const ArrayUpdate<N, M, S>& update, const Matrix<N, N, S>& lower,
-                              const Matrix<M, N, S>& h, const Matrix<M, M, S>& r, KeptAs kept,
-                              S digits = root_digits_left<S>) {
+/// the columns of the array need to have left; `white`, H on entry, becomes root_s^-1 H and `noise`
+/// root_s^-1, a column for each deviation of R. O(n^2 m).
+template <class Lower, class R, class RootS, class Root, class Gain, class White, class Noise, class Sigma,
+          class S>
+[[nodiscard]] bool is_determined(const Lower& lower, const R& r, const RootS& root_s, const Root& root,
+                                 const Gain& gain, White&& white, Noise&& noise, Sigma&& sigma, KeptAs kept,
+                                 S digits) {
   using std::abs;
   using std::sqrt;
-  const int n = static_cast<int>(lower.rows()), m = static_cast<int>(h.rows());
+  const int n = static_cast<int>(lower.rows()), m = static_cast<int>(noise.rows());
   // Rounding of the deviations `of_state` and `of_noise` against the one that is left.
   const auto shrinks = [&](const S& of_state, const S& of_noise, const S& left) {
     const S as_squares = digits_left<S> * (kept == KeptAs::covariance ? of_state * of_state : S(0));
     return of_state * digits <= left && as_squares + digits_left<S> * of_noise * of_noise <= left * left;
   };
-  const auto deviation = [n](const Matrix<N, N, S>& root, int i) {
+  const auto deviation = [n](const auto& of, int i) {
     S variance(0);
-    for (int k = 0; k < n; ++k) variance += root(i, k) * root(i, k);
+    for (int k = 0; k < n; ++k) variance += of(i, k) * of(i, k);
     return static_cast<S>(sqrt(variance));
   };
-  Vector<N, S> sigma = Vector<N, S>::Zero(n);
   for (int i = 0; i < n; ++i) sigma(i) = deviation(lower, i);
-  Matrix<M, N, S> white = h;                            // root_s^-1 H
-  Matrix<M, M, S> noise = Matrix<M, M, S>::Zero(m, m);  // root_s^-1, a column for each deviation of R
   for (int j = 0; j < m; ++j) {
     S of_state(0), of_noise(0);
+    for (int i = 0; i < j; ++i) noise(j, i) = S(0);
     noise(j, j) = r(j, j) > S(0) ? S(sqrt(r(j, j))) : S(0);
     for (int k = 0; k < j; ++k) {
-      for (int i = 0; i < n; ++i) white(j, i) -= update.root_s(j, k) * white(k, i);
-      for (int i = 0; i <= k; ++i) noise(j, i) -= update.root_s(j, k) * noise(k, i);
+      for (int i = 0; i < n; ++i) white(j, i) -= root_s(j, k) * white(k, i);
+      for (int i = 0; i <= k; ++i) noise(j, i) -= root_s(j, k) * noise(k, i);
     }
     for (int i = 0; i < n; ++i) {
-      white(j, i) /= update.root_s(j, j);
+      white(j, i) /= root_s(j, j);
       of_state += abs(white(j, i)) * sigma(i);
     }
     for (int i = 0; i <= j; ++i) {
-      noise(j, i) /= update.root_s(j, j);
+      noise(j, i) /= root_s(j, j);
       of_noise += abs(noise(j, i));
     }
     if (!shrinks(of_state, of_noise, S(1))) return false;
@@ -128,18 +183,35 @@ template <int N, int M, class S>
     S of_state(0), of_noise(0);
     for (int j = 0; j < n; ++j) {
       S entry(i == j ? 1 : 0);  // of I - K H
-      for (int k = 0; k < m; ++k) entry -= update.white(i, k) * white(k, j);
+      for (int k = 0; k < m; ++k) entry -= gain(i, k) * white(k, j);
       of_state += abs(entry) * sigma(j);
     }
     for (int j = 0; j < m; ++j) {
       S entry(0);  // of K
-      for (int k = j; k < m; ++k) entry += update.white(i, k) * noise(k, j);
+      for (int k = j; k < m; ++k) entry += gain(i, k) * noise(k, j);
       of_noise += abs(entry);
     }
-    const S least = root_digits_left<S> * sigma(i), left = deviation(update.root, i);
+    const S least = root_digits_left<S> * sigma(i), left = deviation(root, i);
     if (!shrinks(of_state, of_noise, left > least ? left : least)) return false;
   }
   return true;
+}
+
+/// The same for an array's update.
+template <int N, int M, class S, Wanted When = Wanted::always>
+[[nodiscard]] bool determined(const ArrayUpdate<N, M, S>& update, const Matrix<N, N, S>& lower,
+                              const Matrix<M, N, S>& h, const Matrix<M, M, S>& r, KeptAs kept,
+                              S digits = root_digits_left<S>) {
+  const int n = static_cast<int>(lower.rows()), m = static_cast<int>(h.rows());
+  Matrix<M, N, S> white = h;
+  Matrix<M, M, S> noise = room<M, M, S>(m, m);
+  Vector<N, S> sigma = room<N, 1, S>(n, 1);
+  if constexpr (When == Wanted::always)
+    return is_determined(lower, r, update.root_s, update.root, update.white, white, noise, sigma, kept,
+                         digits);
+  else
+    return is_determined(view(lower), view(r), view(update.root_s), view(update.root), view(update.white),
+                         view(white), view(noise), view(sigma), kept, digits);
 }
 
 /// Takes an array's update over into the innovation, and says whether it may be kept.

@@ -21,6 +21,12 @@ template <class Lane>
   return x < Lane{} ? -x : x;
 }
 
+/// The smaller of two, in one instruction and without a branch; `a` where `b` is no number.
+template <class S>
+[[gnu::always_inline]] inline S lesser(const S& a, const S& b) {
+  return b < a ? b : a;
+}
+
 /// Column j of a triangular matrix: zero after row j, or before it.
 template <int N, class S>
 [[gnu::always_inline]] inline void clear_after(Column<N, S>& column, int j) {

@@ -17,22 +17,24 @@
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
-/// L D L^T of `a` into unit lower L and D^-1/2. False where a pivot is not positive. `loss` is by how much
-/// the smallest share of a diagonal element that is left for its pivot multiplies rounding: 1 or above.
-/// Divisions stay on the critical path, roots do not.
+/// L D L^T of `a` into unit lower L and D^-1/2. False where a pivot is not positive and finite. `loss` is by
+/// how much the smallest share of a diagonal element that is left for its pivot multiplies rounding: 1 or
+/// above. Divisions stay on the critical path, roots do not.
 template <int M, class S>
 [[gnu::always_inline]] [[nodiscard]] inline bool factor(const Matrix<M, M, S>& a, S (&lower)[M][M],
                                                         S (&inverse_root)[M], S& loss) {
   using std::sqrt;
-  bool good = true;
+  S sum(0);  // of the D^-1/2: no number where a pivot is none or negative, infinite where one is zero
+  S least(1);
   S raw[M][M];
   each<M>([&](int i)
               __attribute__((always_inline)) { each<M>(0, i + 1, [&](int j) { raw[i][j] = a(i, j); }); });
   loss = S(1);
   each<M>([&](int j) __attribute__((always_inline)) {
-    good = good && raw[j][j] > S(0) && raw[j][j] <= std::numeric_limits<S>::max();
     const S inverse = S(1) / raw[j][j];
     inverse_root[j] = sqrt(inverse);
+    sum += inverse_root[j];
+    least = lesser(least, inverse_root[j]);
     if (j > 0) {  // the first pivot is its diagonal element
       const S share = inverse * a(j, j);
       loss = share > loss ? share : loss;
@@ -42,7 +44,7 @@ template <int M, class S>
       each<M>(j + 1, i + 1, [&](int k) { raw[i][k] -= lower[i][j] * raw[k][j]; });
     });
   });
-  return good;
+  return (sum <= std::numeric_limits<S>::max()) & (least > S(0));
 }
 
 /// What M measured numbers do to N states: with S = H P H^T + R = L D L^T,

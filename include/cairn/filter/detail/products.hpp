@@ -13,6 +13,7 @@
 
 #include <array>
 #include <cstddef>
+#include <limits>
 
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
@@ -140,7 +141,7 @@ template <ProductRows Wanted, class A, int N, class S>
     unrolled<static_cast<std::size_t>(N)>([&](auto column) __attribute__((always_inline)) {
       of_a[column] = column_of<static_cast<int>(column), unit>(a);
     });
-    each<N>([&](int j) {
+    each<N>([&](int j) __attribute__((always_inline)) {
       if constexpr (unit) sum[j].add(u[j]);
       unrolled<static_cast<std::size_t>(N * count)>([&](auto pair) __attribute__((always_inline)) {
         constexpr int k = static_cast<int>(pair) / count;
@@ -202,6 +203,48 @@ template <class Q, int N>
   return filled;
 }
 
+/// No row of a symmetric pattern has more than one entry beside the diagonal: a covariance of single numbers
+/// and of pairs, as of positions with their velocities.
+template <class Q>
+  requires(is_structured<Q>)
+[[nodiscard]] consteval bool in_pairs() {
+  std::array<int, static_cast<std::size_t>(Q::row_count)> beside{};
+  for (const Entry& entry : Q::entries)
+    if (entry.row != entry.column && ++beside[static_cast<std::size_t>(entry.row)] > 1) return false;
+  return true;
+}
+
+template <class Q>
+[[nodiscard]] consteval bool in_pairs() {
+  return false;
+}
+
+/// Such a matrix is a covariance, up to the rounding of its diagonal: q_ij^2 <= q_ii q_jj. False says
+/// nothing.
+template <class Q>
+[[gnu::always_inline]] [[nodiscard]] inline bool covaries_in_pairs(const Q& q) {
+  using S = typename Q::Scalar;
+  S diagonal[static_cast<std::size_t>(Q::row_count)]{};
+  bool good = true;
+  unrolled<Q::entries.size()>([&](auto e) __attribute__((always_inline)) {
+    constexpr Entry entry = Q::entries[e];
+    if constexpr (entry.row == entry.column) {
+      diagonal[entry.row] = q.template value<e>();
+      good = good && diagonal[entry.row] >= S(0);
+    }
+  });
+  unrolled<Q::entries.size()>([&](auto e) __attribute__((always_inline)) {
+    constexpr Entry entry = Q::entries[e];
+    if constexpr (entry.row > entry.column) {
+      const S beside = q.template value<e>();
+      const S most = diagonal[entry.row] * diagonal[entry.column] * (S(1) + rounding_share<S>);
+      const bool in_range = most >= std::numeric_limits<S>::min() && most <= std::numeric_limits<S>::max();
+      good = good && ((in_range && beside * beside <= most) || beside == S(0));
+    }
+  });
+  return good;
+}
+
 /// Elimination of a symmetric structured matrix meets pivots alone that are well above rounding, or zeros in
 /// a column of zeros: it is a covariance. False says nothing. Number by number, without its zeros.
 template <class Q>
@@ -242,7 +285,7 @@ template <class Q>
 template <int R, int C, int K, class S>
 [[nodiscard]] Matrix<R, K, S> column_product(const Matrix<R, C, S>& a, const Matrix<C, K, S>& b) {
   if constexpr (R == dynamic || C == dynamic || K == dynamic) {
-    return a * b;
+    return product(a, b);
   } else {
     Matrix<R, K, S> out;
     for (int k = 0; k < K; ++k) {

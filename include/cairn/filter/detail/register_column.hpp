@@ -125,7 +125,17 @@ struct Column {
         }(std::make_index_sequence<static_cast<std::size_t>(width)>{});
     });
   }
-  [[gnu::always_inline]] const S& operator[](int i) const { return reinterpret_cast<const S*>(lanes)[i]; }
+  /// Few numbers are read from a copy of their register: a compiler that sees single ones read from the array
+  /// takes that to pieces, and puts the registers together again through memory. Where there are many, loops
+  /// stay loops (each()) and the array is in memory anyway.
+  [[gnu::always_inline]] S operator[](int i) const {
+    if constexpr (width > 1 && N <= 10) {
+      const Lane lane = lanes[i / width];
+      return lane[i % width];
+    } else {
+      return reinterpret_cast<const S*>(lanes)[i];
+    }
+  }
   [[gnu::always_inline]] void add(const Column& other) {
     each<count>([&](int k) { lanes[k] += other.lanes[k]; });
   }

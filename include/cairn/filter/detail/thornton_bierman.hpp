@@ -29,7 +29,7 @@ void ud_of_root(const Matrix<N, N, S>& root, Matrix<N, N, S>& u, Vector<N, S>& d
   Matrix<N, N, S> array;
   for (int j = 0; j < N; ++j)
     for (int k = 0; k < N; ++k) array(k, N - 1 - j) = root(j, k);
-  triangularise(array);
+  triangularise(view(array));
   u.setIdentity();
   for (int j = 0; j < N; ++j) {
     const S deviation = array(N - 1 - j, N - 1 - j);

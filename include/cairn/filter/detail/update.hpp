@@ -102,15 +102,13 @@ template <int N, int M, class S>
   const int n = static_cast<int>(prior.rows()), m = static_cast<int>(residual.size());
   Matrix<N, N, S> root = prior;
   Matrix<M, M, S> root_r = r;
-  if (!checked_root<N, S>(prior, root) || !checked_root<M, S>(r, root_r))
-    return Status::not_positive_definite;
+  if (!rare_root<N, S>(prior, root) || !rare_root<M, S>(r, root_r)) return Status::not_positive_definite;
   constexpr int size = size_sum<N, M>;
-  Matrix<size, size, S> array = Matrix<size, size, S>::Zero(m + n, m + n);
-  put_transposed(array, 0, 0, root_r);
-  put_transposed(array, m, 0, column_product(h, root));
-  put_transposed(array, m, m, root);
-  update = update_by_array<N, M, S>(array, residual, n);
-  const bool good = update.regular && determined<N, M, S>(update, root, h, r, KeptAs::covariance);
+  Matrix<size, size, S> array = room<size, size, S>(m + n, m + n);
+  fill_array(view(array), view(h), view(root), view(root_r));
+  update = update_by_array<N, M, S, Wanted::rarely>(array, residual, n);
+  const bool good =
+      update.regular && determined<N, M, S, Wanted::rarely>(update, root, h, r, KeptAs::covariance);
   return good ? Status::accepted : Status::not_positive_definite;
 }
 
@@ -145,12 +143,13 @@ template <int N, class S>
     good = good && updated(i, i) >= digits * prior(i, i);
   return good;
 }
+/// The same in registers. NaN keeps them here: is_covariance() is what sees it.
 template <int N, class S>
 [[gnu::always_inline]] [[nodiscard]] inline bool keeps_digits(const Column<N, S> (&updated)[N],
                                                               const Matrix<N, N, S>& prior, const S& digits) {
-  bool good = true;
-  each<N>([&](int i) { good = good && updated[i][i] >= digits * prior(i, i); });
-  return good;
+  S least = updated[0][0] - digits * prior(0, 0);
+  each<N>(1, N, [&](int i) { least = lesser(least, updated[i][i] - digits * prior(i, i)); });
+  return least >= S(0);
 }
 
 /// One number at a time: z_j = h_j x + noise of variance d_j, after L^-1 with R = L diag(d) L^T. False where
@@ -235,10 +234,10 @@ void correct_into(Candidate<N, M, S>& out, const Matrix<N, N, S>& prior, const M
     in.status = Status::size_mismatch;
     return;
   }
-  const Matrix<N, M, S> ph = prior * h.transpose();
-  in.covariance = symmetrised(h * ph + r);
+  const Matrix<N, M, S> ph = product_transposed(prior, h);
+  in.covariance = symmetrised(product(h, ph) + r);
   const Cholesky<M, S> root(in.covariance);
-  const Matrix<M, N, S> w = root.whiten(Matrix<M, N, S>(ph.transpose()));  // S^-1/2 H P
+  const Matrix<M, N, S> w = root.whiten(transposed(ph));  // S^-1/2 H P
   const Vector<M, S> y = root.whiten(in.residual);
   in.nis = y.squaredNorm();
   const S digits = digits_left<S> / root.least_share();
@@ -246,14 +245,16 @@ void correct_into(Candidate<N, M, S>& out, const Matrix<N, N, S>& prior, const M
   bool good =
       sound && in.nis <= static_cast<S>(gate) && gate > 0.0 && in.nis <= std::numeric_limits<S>::max();
   if (good) {
-    out.step = w.transpose() * y;
+    out.step = transposed_product(w, y);
     if (form == Form::joseph) {
       const Matrix<M, N, S> gain_t = root.unwhiten(w);
-      Matrix<N, N, S> a = -gain_t.transpose() * h;
-      a.diagonal().array() += S(1);
-      out.covariance = symmetrised(a * prior * a.transpose() + gain_t.transpose() * r * gain_t);
+      const Matrix<N, M, S> gain = transposed(gain_t);
+      Matrix<N, N, S> a = -product(gain, h);
+      for (int i = 0; i < static_cast<int>(a.rows()); ++i) a(i, i) += S(1);
+      out.covariance =
+          symmetrised(product_transposed(product(a, prior), a) + product(product(gain, r), gain_t));
     } else {
-      out.covariance = symmetrised(prior - w.transpose() * w);
+      out.covariance = symmetrised(prior - transposed_product(w, w));
     }
     good = keeps_digits<N, S>(out.covariance, prior, digits) && is_valid_covariance<N, S>(out.covariance);
   }
@@ -296,23 +297,29 @@ template <int N, class S>
 
 /// At first sight: the noise is a covariance. False says only that judge_noise() must look. Zeros that are
 /// known when compiling cost nothing, and a matrix that is diagonal as it happens next to nothing; any other
-/// is eliminated, O(N^3 / 6).
+/// is eliminated, O(N^3 / 6). NaN may pass: it is in the predicted covariance too.
 template <int N, class Q>
 [[gnu::always_inline]] [[nodiscard]] inline bool looks_like_noise(const Q& q) {
   bool good = true;
   if constexpr (is_diagonal<Q>) {
-    each<N>([&](int i) { good = good && q.values[static_cast<std::size_t>(i)] >= 0; });
+    typename Q::Scalar least = q.values[0];
+    each<N>(1, N, [&](int i) { least = lesser(least, q.values[static_cast<std::size_t>(i)]); });
+    good = least >= 0;
+  } else if constexpr (in_pairs<Q>()) {
+    good = covaries_in_pairs(q);
   } else if constexpr (is_structured<Q> && N <= 10) {
     good = eliminates(q);
   } else if constexpr (is_structured<Q>) {
     good = is_covariance(Matrix<N, N, typename Q::Scalar>(q.dense()));
   } else {
-    bool diagonal = true;
+    auto least = q(0, 0);
+    auto beside = decltype(least)(0);  // the diagonal: the sum of the magnitudes
     each<N>([&](int j) __attribute__((always_inline)) {
-      good = good && q(j, j) >= 0;
-      each<N>(j + 1, N, [&](int i) { diagonal = diagonal && q(i, j) == 0; });
+      least = lesser(least, q(j, j));
+      each<N>(j + 1, N, [&](int i) { beside += magnitude(q(i, j)); });
     });
-    if (!diagonal) good = is_covariance(q);
+    good = least >= 0;
+    if (beside != 0) good = is_covariance(q);
   }
   return good;
 }
@@ -332,18 +339,17 @@ template <Manifold X>
 template <int N, class S>
 [[gnu::always_inline]] [[nodiscard]] inline bool finite_variances(const Column<N, S> (&p)[N]) {
   typename Column<N, S>::Lane none = p[0].lanes[0] * S(0);
-  bool good = p[0][0] >= S(0);
+  S least = p[0][0];
   each<N>([&](int j) {
     each<Column<N, S>::count>([&](int k) { none += p[j].lanes[k] * S(0); });
-    good = good && p[j][j] >= S(0);
+    least = lesser(least, p[j][j]);
   });
-  if constexpr (Column<N, S>::width == 1) {
-    return good && none == S(0);
-  } else {
-    S sum(0);
+  S sum(0);
+  if constexpr (Column<N, S>::width == 1)
+    sum = none;
+  else
     for (int k = 0; k < Column<N, S>::width; ++k) sum += none[k];
-    return good && sum == S(0);
-  }
+  return (least >= S(0)) & (sum == S(0));
 }
 
 /// Why a prediction that went wrong went wrong. Off the hot path.
@@ -390,8 +396,8 @@ Status advance(Gaussian<X>& belief, const X& mean, const F& f, const CovarianceO
       q.cols() != f.rows())
     return Status::size_mismatch;
   if (const Status status = judge_noise<dof<X>, S>(q); status != Status::accepted) return status;
-  CovarianceOf<X> next = static_cast<S>(fading) * f * belief.covariance * f.transpose();
-  next = symmetrised(next + q);
+  CovarianceOf<X> next = product_transposed(product(f, belief.covariance), f);
+  next = symmetrised(static_cast<S>(fading) * next + q);
   bool positive = true;
   for (int i = 0; i < static_cast<int>(next.rows()); ++i) {
     next(i, i) += static_cast<S>(extra);

@@ -1,0 +1,332 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The Rao-Blackwellised particle filter of mapping: paths are sampled, and each particle carries the map
+/// that is exact given its path.
+///
+///   p(x_1:t, m | z_1:t, u_1:t) = p(x_1:t | z_1:t, u_1:t) p(m | x_1:t, z_1:t)
+/// (K. Murphy, "Bayesian map learning in dynamic environments", NIPS 1999; A. Doucet, N. de Freitas,
+/// K. Murphy, S. Russell, UAI 2000.) A step proposes a pose in every particle, weighs, resamples where the
+/// weights have degenerated, and only then takes the observation into the maps: copies of a particle share
+/// what they have until they write. Which map, and how poses are proposed, are the user's: ConditionalMap and
+/// Proposal. Particle i of step t draws from its own stream of random numbers, so that the result is the same
+/// bit for bit for any number of threads.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <numbers>
+#include <type_traits>
+#include <utility>
+#include <vector>
+
+#include <cairn/core/check.hpp>
+#include <cairn/core/cholesky.hpp>
+#include <cairn/core/parallel.hpp>
+#include <cairn/core/random.hpp>
+#include <cairn/filter/detail/path_tree.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/particle.hpp>
+#include <cairn/filter/status.hpp>
+#include <cairn/manifold/manifold.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn { inline namespace CAIRN_ABI {
+
+/// One particle's map: how likely an observation is at a pose, and the exact map after it.
+template <class M>
+concept ConditionalMap =
+    std::copyable<M> && Manifold<typename M::Pose> &&
+    requires(M& m, const M& c, const typename M::Pose& x, const typename M::Observation& z) {
+      { c.log_likelihood(x, z) } -> std::convertible_to<double>;
+      m.insert(x, z);
+    };
+
+/// A pose that was drawn from q, with the weight that makes up for the difference to what it stands for:
+/// log_weight = log p(z | x, m) + log p(x | motion) - log q(x).
+template <Manifold X>
+struct Proposed {
+  X pose;
+  Gaussian<X> drawn_from;  ///< q, or its moments; the motion where that was drawn from
+  double log_weight = 0;
+  double log_likelihood = 0;  ///< log p(z | x, m)
+  std::size_t regime = 0;     ///< of the motion that the pose belongs to, where there are several
+};
+
+/// How a pose is proposed from what the motion says and the observation.
+template <class P, class M, class Motion>
+concept Proposal = ConditionalMap<M> && requires(const P& propose, const M& map, const Motion& motion,
+                                                 const typename M::Observation& z, Random& random) {
+  { propose(map, motion, z, random) } -> std::same_as<Proposed<typename M::Pose>>;
+};
+
+/// Logarithm of a Gaussian's density at x, by steps from its mean; -infinity where the covariance is not
+/// positive definite.
+template <Manifold X>
+[[nodiscard]] double log_density(const Gaussian<X>& belief, const X& x) {
+  const Cholesky<dof<X>, ScalarOf<X>> root(belief.covariance);
+  if (!root.good()) return -std::numeric_limits<double>::infinity();
+  const Tangent<X> d = local(belief.mean, x);
+  return static_cast<double>(-0.5 * (root.whiten(d).squaredNorm() + root.log_determinant() +
+                                     static_cast<double>(d.size()) * std::log(2 * std::numbers::pi)));
+}
+
+/// A motion under one of several regimes (forwards, backwards, slipping, ...): the share of each, given the
+/// particle's past, and what it does to the pose. The shares sum to 1. The regime is a part of the sampled
+/// state and stays with the particle: a jump Markov system.
+template <Manifold X>
+struct RegimeMotion {
+  struct Mode {
+    std::size_t regime = 0;
+    double share = 1;
+    Gaussian<X> motion;
+  };
+  std::vector<Mode> modes;
+};
+
+/// Poses drawn from the motion and weighed by the likelihood: the bootstrap filter.
+struct FromMotion {
+  template <ConditionalMap M>
+  [[nodiscard]] Proposed<typename M::Pose> operator()(const M& map, const Gaussian<typename M::Pose>& motion,
+                                                      const typename M::Observation& z,
+                                                      Random& random) const {
+    typename M::Pose pose = sample(motion, random);
+    const double log_likelihood = map.log_likelihood(pose, z);
+    return {std::move(pose), motion, log_likelihood, log_likelihood, 0};
+  }
+  /// The regime is drawn by its share first.
+  template <ConditionalMap M>
+  [[nodiscard]] Proposed<typename M::Pose> operator()(const M& map,
+                                                      const RegimeMotion<typename M::Pose>& motion,
+                                                      const typename M::Observation& z,
+                                                      Random& random) const {
+    CAIRN_EXPECTS(!motion.modes.empty(), "FromMotion needs a motion of at least one regime");
+    double left = random.uniform();
+    std::size_t chosen = 0;
+    while (chosen + 1 < motion.modes.size() && left >= motion.modes[chosen].share)
+      left -= motion.modes[chosen++].share;
+    auto proposed = (*this)(map, motion.modes[chosen].motion, z, random);
+    proposed.regime = motion.modes[chosen].regime;
+    return proposed;
+  }
+};
+
+/// One pose of a path.
+template <Manifold X>
+struct PathPose {
+  X pose;                  ///< what the map was made with
+  Gaussian<X> drawn_from;  ///< the proposal's moments
+  X before;                ///< the pose of the step before, when this one was drawn
+  X drawn;                 ///< this pose, when it was drawn: other than `pose` where the path was moved since
+  std::uint64_t step = 0;  ///< 0 for the start
+};
+
+/// Weighted particles, each with a pose, a map and the path that led there.
+template <ConditionalMap M>
+class MappedPaths {
+public:
+  using Pose = typename M::Pose;
+  struct Particle {
+    Pose pose;
+    M map;
+    std::uint32_t node;       // of the path
+    double log_evidence = 0;  ///< sum of the log weights along the path
+    std::size_t regime = 0;   ///< of the newest motion
+  };
+
+  /// `count` equal particles at a pose that is taken for exact. Throws Error where there are none.
+  MappedPaths(const Pose& start, const M& map, std::size_t count) {
+    if (count == 0) raise("MappedPaths: expected at least one particle");
+    std::vector<Particle> all;
+    all.reserve(count);
+    const CovarianceOf<Pose> none = CovarianceOf<Pose>::Zero(dof_of(start), dof_of(start));
+    for (std::size_t i = 0; i < count; ++i)
+      all.push_back({start, map, paths_.extend(Tree::none, {start, {start, none}, start, start, 0}), 0, 0});
+    particles_ = Particles<Particle>::equal(std::move(all));
+  }
+
+  [[nodiscard]] std::size_t size() const noexcept { return particles_.size(); }
+  [[nodiscard]] const Particle& operator[](std::size_t i) const { return particles_.states[i]; }
+  [[nodiscard]] const Particles<Particle>& particles() const noexcept { return particles_; }
+  [[nodiscard]] std::uint64_t steps() const noexcept { return step_; }
+
+  /// The particle with the largest sum of log weights along its ancestry: one path and the map of that path.
+  [[nodiscard]] std::size_t best() const {
+    std::size_t best = 0;
+    for (std::size_t i = 1; i < size(); ++i)
+      if ((*this)[i].log_evidence > (*this)[best].log_evidence) best = i;
+    return best;
+  }
+  /// The path of a particle from the start.
+  [[nodiscard]] std::vector<PathPose<Pose>> path(std::size_t particle) const {
+    return paths_.path_to((*this)[particle].node);
+  }
+  /// Leaves `survivors` particles, drawn by their weights, each copied as often as the others: for what is
+  /// too dear to be done to all. Returns for each particle the first of the same copies, itself or one before
+  /// it.
+  std::vector<std::size_t> concentrate(std::size_t survivors, Random& random) {
+    CAIRN_EXPECTS(survivors > 0, "concentrate needs at least one survivor");
+    survivors = std::min(survivors, size());
+    const std::vector<std::size_t> drawn =
+        resampled_indices(particles_.weights(), survivors, Resampling::systematic, random);
+    std::vector<std::size_t> chosen, first;
+    for (std::size_t i = 0; i < size(); ++i) {
+      chosen.push_back(drawn[i * survivors / size()]);
+      first.push_back(i > 0 && chosen[i] == chosen[i - 1] ? first.back() : i);
+    }
+    choose(chosen);
+    return first;
+  }
+
+  /// Puts a particle on another path, whose map this is: a move of the path that leaves its distribution what
+  /// it should be is the caller's to make. As long as the old path; its last pose is the particle's.
+  void move(std::size_t particle, std::vector<PathPose<Pose>> path, M map) {
+    CAIRN_EXPECTS(path.size() == step_ + 1, "move needs a path of as many poses as the particle's");
+    std::uint32_t node = Tree::none;
+    for (PathPose<Pose>& pose : path) {
+      const std::uint32_t before = node;
+      node = paths_.extend(before, std::move(pose));
+      paths_.release(before);
+    }
+    put(particle, node, std::move(map));
+  }
+  /// Puts a particle on the path and the map of another.
+  void copy_path(std::size_t from, std::size_t to) {
+    paths_.hold((*this)[from].node);
+    put(to, (*this)[from].node, (*this)[from].map);
+  }
+
+  /// Poses stored for all paths together.
+  [[nodiscard]] std::size_t stored_poses() const noexcept { return paths_.size(); }
+
+  /// Weighted mean and covariance of the newest poses; within a particle the pose is taken to be as uncertain
+  /// as the density it was drawn from.
+  [[nodiscard]] Gaussian<Pose> pose() const {
+    Particles<Pose> poses;
+    for (const Particle& p : particles_.states) poses.states.push_back(paths_.at(p.node).drawn_from.mean);
+    poses.log_weights = particles_.log_weights;
+    Gaussian<Pose> result = moments(poses);
+    const std::vector<double> weights = particles_.weights();
+    for (std::size_t i = 0; i < size(); ++i)
+      result.covariance += weights[i] * paths_.at((*this)[i].node).drawn_from.covariance;
+    return result;
+  }
+
+private:
+  friend struct ConditionalFilter;
+  using Tree = detail::PathTree<PathPose<Pose>>;
+
+  void put(std::size_t particle, std::uint32_t node, M map) {
+    Particle& p = particles_.states[particle];
+    paths_.release(p.node);
+    p.node = node;
+    p.pose = paths_.at(node).pose;
+    p.map = std::move(map);
+  }
+
+  void extend(std::vector<Proposed<Pose>>& proposed, double evidence_share) {
+    ++step_;
+    for (std::size_t i = 0; i < size(); ++i) {
+      Particle& p = particles_.states[i];
+      const std::uint32_t before = p.node;
+      const Pose from = p.pose;
+      p.pose = proposed[i].pose;
+      p.node = paths_.extend(before, {p.pose, std::move(proposed[i].drawn_from), from, p.pose, step_});
+      paths_.release(before);
+      p.log_evidence += evidence_share * proposed[i].log_weight;
+      p.regime = proposed[i].regime;
+    }
+  }
+
+  void resample(Resampling scheme, Random& random) {
+    choose(resampled_indices(particles_.weights(), size(), scheme, random));
+  }
+
+  void choose(const std::vector<std::size_t>& chosen) {
+    std::vector<Particle> next;
+    next.reserve(chosen.size());
+    for (const std::size_t i : chosen) {
+      next.push_back(particles_.states[i]);
+      paths_.hold(next.back().node);
+    }
+    for (const Particle& p : particles_.states) paths_.release(p.node);
+    particles_ = Particles<Particle>::equal(std::move(next));
+  }
+
+  Particles<Particle> particles_;
+  Tree paths_;
+  std::uint64_t step_ = 0;
+};
+
+/// What a step did.
+struct [[nodiscard]] MappingStep {
+  Status status = Status::accepted;
+  double effective_size = 0;  ///< of the weights, before resampling
+  bool resampled = false;
+
+  [[nodiscard]] bool accepted() const noexcept { return status == Status::accepted; }
+};
+
+/// The filter. Options only.
+struct ConditionalFilter {
+  Resampling scheme = Resampling::systematic;
+  double resample_below = 0.5;  ///< resample when the effective number falls below this share; 0 never
+  /// How much of a step's log weight counts. 1 is the model as it is written; less where the model errs in
+  /// the same way at every step, so that evidence of many steps is not worth as many times one.
+  double evidence_share = 1;
+  bool insert = true;  ///< false localises in maps that stay as they are
+  std::uint64_t seed = 0;
+  unsigned threads = 1;
+
+  /// One step: `motion(pose, regime)` gives what is known of a particle's next pose before z is seen,
+  /// `proposal` draws from it and z. Refused, and nothing changed, where no particle is left with a weight,
+  /// one is no number, or an option is out of range. What map or proposal throw comes through, and the belief
+  /// is then not to be used.
+  template <ConditionalMap M, class Motion, class P>
+    requires Proposal<P, M, std::invoke_result_t<const Motion&, const typename M::Pose&, std::size_t>>
+  MappingStep step(MappedPaths<M>& belief, const Motion& motion, const P& proposal,
+                   const typename M::Observation& z) const {
+    if (!(resample_below >= 0 && resample_below <= 1) || !(evidence_share > 0 && evidence_share <= 1))
+      return {.status = Status::bad_option};
+    std::vector<Proposed<typename M::Pose>> proposed(belief.size());
+    parallel_for(belief.size(), threads, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        Random random(seed, stream(belief.steps() + 1, i));
+        proposed[i] = proposal(belief[i].map, motion(belief[i].pose, belief[i].regime), z, random);
+      }
+    });
+    std::vector<double> log_weights(belief.size());
+    for (std::size_t i = 0; i < belief.size(); ++i) log_weights[i] = evidence_share * proposed[i].log_weight;
+    MappingStep result;
+    result.status = belief.particles_.reweigh(log_weights);
+    if (!result.accepted()) return result;
+    belief.extend(proposed, evidence_share);
+    result.effective_size = belief.particles_.effective_size();
+    if (result.effective_size < resample_below * static_cast<double>(belief.size())) {
+      Random random(seed, stream(belief.steps(), all_particles));
+      belief.resample(scheme, random);
+      result.resampled = true;
+    }
+    if (insert)
+      parallel_for(belief.size(), threads, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i) {
+          auto& particle = belief.particles_.states[i];
+          particle.map.insert(particle.pose, z);
+        }
+      });
+    return result;
+  }
+
+private:
+  static constexpr std::uint64_t all_particles = 0xffffffffU;
+  static constexpr std::uint64_t stream(std::uint64_t step, std::uint64_t slot) noexcept {
+    return (step << 32U) + slot;
+  }
+};
+
+}}  // namespace cairn::CAIRN_ABI
