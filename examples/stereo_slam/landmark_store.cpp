@@ -27,6 +27,7 @@ public:
 
   LandmarkId add(const Look& look) override { return store_.add(look.descriptor, label_of(look.sign)); }
   void sighted(LandmarkId id) override { store_.sighted(id); }
+  void erase(LandmarkId id) override { static_cast<void>(store_.erase(id)); }
   std::vector<LandmarkId> advance() override { return store_.advance().expired; }
 
   std::vector<std::optional<StoreMatch>> match(std::span<const Look> looks, unsigned threads) const override {

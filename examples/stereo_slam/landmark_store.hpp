@@ -50,6 +50,8 @@ public:
   /// A new landmark; it can be matched from the next step on.
   [[nodiscard]] virtual LandmarkId add(const Look& look) = 0;
   virtual void sighted(LandmarkId id) = 0;
+  /// Removes a landmark, where it is there.
+  virtual void erase(LandmarkId id) = 0;
   /// Ends the step; returns the landmarks that ran out of time.
   virtual std::vector<LandmarkId> advance() = 0;
   [[nodiscard]] virtual std::vector<std::optional<StoreMatch>> match(std::span<const Look> looks,

@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: MIT
 //
 /// @file
-/// The landmarks of the map: where each is, how sure that is, how often it was seen.
+/// The landmarks of the map: what each looks like, and how often it was seen.
 ///
-/// Their looks live in a landmark store (cairn/index/landmark_store.hpp); both go by the same id.
+/// Where they are is in the map of keyframes (cairn/slam/keyframe_map.hpp), which of them looks like what is
+/// seen in a landmark store (cairn/index/landmark_store.hpp); all three go by the same id.
 #pragma once
 
 #include <cstddef>
@@ -14,8 +15,6 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
-#include <cairn/core/linalg.hpp>
-#include <cairn/filter/gaussian.hpp>
 
 namespace stereo_slam {
 
@@ -23,20 +22,12 @@ using LandmarkId = std::uint32_t;
 
 struct Landmark {
   LandmarkId id = 0;
-  cairn::Gaussian<cairn::Vector<3>> position;  ///< world frame [m]
   std::vector<float> descriptor;
   std::int8_t sign = 0;  ///< of the Laplacian: -1 bright, +1 dark
   std::uint8_t grey = 0;
   int first_seen = 0;  ///< step
-  int last_seen = 0;   ///< step whose pose and pixels the position was last computed from
-  cairn::Vector<2> left_pixel = cairn::Vector<2>::Zero(), right_pixel = cairn::Vector<2>::Zero();  ///< then
+  int last_seen = 0;   ///< step
   int sightings = 1;
-
-  void seen(int step, const cairn::Vector<2>& left, const cairn::Vector<2>& right) {
-    last_seen = step;
-    left_pixel = left;
-    right_pixel = right;
-  }
 };
 
 /// Landmarks in no particular but deterministic order, found by id in O(1).

@@ -39,6 +39,7 @@ struct Arguments {
   std::filesystem::path dump;
   std::string store = "multi";
   std::string features = "surf";
+  std::string calibrate = "auto";
 };
 
 /// Everything the command line can say; CLI11 ends the program by an exception on --help and on mistakes.
@@ -69,8 +70,13 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
       ->capture_default_str();
   app.add_flag("--oriented", arguments.pipeline.oriented,
                "oriented SURF, for cameras that roll (default: upright)");
-  app.add_flag("--calibrate", arguments.pipeline.calibrate,
-               "correct the rig's calibration while moving, for rigs that come loose (default: trust it)");
+  app.add_option("--calibrate", arguments.calibrate,
+                 "the rig's calibration is corrected while moving: auto (where the first frame shows that it "
+                 "is off), on,\n"
+                 "off, or drifting (for rigs that come loose)")
+      ->check(CLI::IsMember(std::vector<std::string>(stereo_slam::calibration_names.begin(),
+                                                     stereo_slam::calibration_names.end())))
+      ->capture_default_str();
   app.add_option("--features", arguments.features,
                  "interest points: surf, or OpenCV's sift or orb where it was there when building")
       ->check(CLI::IsMember(
@@ -163,8 +169,9 @@ void print_summary(const stereo_slam::RunRecord& record) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Stereo landmark SLAM: SURF points, a growing forest of kd-trees, robust pose in pixels, Kalman "
-      "filters.");
+      "Stereo landmark SLAM: SURF points, a growing forest of kd-trees, robust pose in pixels, keyframes "
+      "with "
+      "one joint covariance.");
   Arguments arguments;
   arguments.pipeline.threads = std::max(1U, std::thread::hardware_concurrency());
   std::vector<std::string> dataset{"arena"};
@@ -180,6 +187,9 @@ int main(int argc, char** argv) {
     const auto name = std::ranges::find(stereo_slam::feature_names, arguments.features);
     arguments.pipeline.features =
         static_cast<stereo_slam::FeatureKind>(name - stereo_slam::feature_names.begin());
+    const auto calibrate = std::ranges::find(stereo_slam::calibration_names, arguments.calibrate);
+    arguments.pipeline.calibrate =
+        static_cast<stereo_slam::Calibration>(calibrate - stereo_slam::calibration_names.begin());
     const auto frames = stereo_slam::open_dataset(arguments.dataset);
     if (!arguments.dump.empty()) {
       stereo_slam::write_kitti_sequence(*frames, arguments.dump);

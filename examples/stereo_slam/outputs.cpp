@@ -14,6 +14,7 @@
 
 #include <cairn/io/file.hpp>
 #include <cairn/io/ply.hpp>
+#include <cairn/io/text.hpp>
 #include <cairn/io/trajectory.hpp>
 
 #include "../support/report.hpp"
@@ -28,7 +29,8 @@ namespace fs = std::filesystem;
 
 example::ResultFolder results_in(const fs::path& folder) {
   return {folder,
-          {"trajectory.tum", "trajectory.kitti", "map.ply", "summary.json", "timing.json", "report.html"}};
+          {"trajectory.tum", "trajectory.kitti", "trajectory_covariance.csv", "map.ply", "summary.json",
+           "timing.json", "report.html"}};
 }
 
 cairn::Trajectory trajectory_of(const RunRecord& run) {
@@ -47,6 +49,27 @@ double largest_sigma(const cairn::Matrix<3, 3>& covariance) {
 
 void prepare_output_folder(const fs::path& folder) {
   results_in(folder).prepare();
+}
+
+void write_covariances(const fs::path& path, const std::vector<FrameRecord>& frames) {
+  constexpr std::array<const char*, 6> names{"x", "y", "z", "rx", "ry", "rz"};
+  std::string text = "frame,time,tracked";
+  for (std::size_t i = 0; i < 6; ++i)
+    for (std::size_t j = i; j < 6; ++j) text += std::string(",") + names[i] + "_" + names[j];
+  text += '\n';
+  for (const FrameRecord& frame : frames) {
+    cairn::append_number(text, frame.index);
+    text += ',';
+    cairn::append_number(text, frame.time);
+    text += frame.tracked ? ",1" : ",0";
+    for (int i = 0; i < 6; ++i)
+      for (int j = i; j < 6; ++j) {
+        text += ',';
+        cairn::append_number(text, frame.covariance(i, j));
+      }
+    text += '\n';
+  }
+  cairn::write_file_atomically(path, text);
 }
 
 void write_map(const fs::path& path, const std::vector<LandmarkRecord>& landmarks) {
@@ -86,6 +109,7 @@ std::optional<std::string> write_outputs(const RunRecord& run, const fs::path& f
     const cairn::Trajectory trajectory = trajectory_of(run);
     cairn::write_tum(staging / "trajectory.tum", trajectory);
     cairn::write_kitti(staging / "trajectory.kitti", trajectory);
+    write_covariances(staging / "trajectory_covariance.csv", run.frames);
     write_map(staging / "map.ply", run.landmarks);
     cairn::write_file_atomically(staging / "summary.json", summary_json(run, summary));
     cairn::write_file_atomically(staging / "timing.json", timing_json(run));

@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: MIT
 //
 /// @file
-/// The files a run leaves in its output folder: trajectory.tum, trajectory.kitti, map.ply, summary.json,
-/// report.html and timing.json. All but the last are the same bytes for the same options and data.
+/// The files a run leaves in its output folder: trajectory.tum, trajectory.kitti, trajectory_covariance.csv,
+/// map.ply, summary.json, report.html and timing.json. All but the last are the same bytes for the same
+/// options and data.
 #pragma once
 
 #include <filesystem>
@@ -23,6 +24,12 @@ void prepare_output_folder(const std::filesystem::path& folder);
 /// without the page for it (a report of an earlier run is then removed).
 [[nodiscard]] std::optional<std::string> write_outputs(const RunRecord& run,
                                                        const std::filesystem::path& folder);
+
+/// trajectory_covariance.csv: a head line, then a line a frame: its number, time [s], whether it was tracked
+/// (1 or 0), and the upper triangle of the covariance of its pose, row by row: the 21 numbers P_11 P_12 ...
+/// P_16 P_22 ... P_66 in m^2, m rad and rad^2. Error: truth = T_world_camera exp(e), e = (translation x y z,
+/// rotation x y z) in the axes of the left camera. The frame that is the world has the gauge's.
+void write_covariances(const std::filesystem::path& path, const std::vector<FrameRecord>& frames);
 
 /// map.ply: x y z [m, world of the first camera], grey and red green blue (all the same grey, for viewers
 /// that know no grey), sigma (root of the largest variance [m]), age [frames], sightings. A landmark with a

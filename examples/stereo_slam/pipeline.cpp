@@ -10,52 +10,23 @@
 #include <utility>
 
 #include <cairn/core/parallel.hpp>
-#include <cairn/filter/kalman.hpp>
-#include <cairn/filter/structured.hpp>
+#include <cairn/io/text.hpp>
 
 namespace stereo_slam {
 namespace {
 
-/// Adds the time of its own life to a stage of a frame's record.
-class StageTimer {
-public:
-  StageTimer(FrameRecord& record, Stage stage)
-      : milliseconds_(record.milliseconds[static_cast<std::size_t>(stage)]) {}
-  StageTimer(const StageTimer&) = delete;
-  StageTimer& operator=(const StageTimer&) = delete;
-  ~StageTimer() {
-    milliseconds_ +=
-        std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start_).count();
-  }
-
-private:
-  double& milliseconds_;
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
-
-/// A landmark stands still: F = I, B = 0, and a little noise so that its filter never stops listening.
-struct StandingStill {
-  static constexpr bool linear = true;
-  using State = cairn::Vector<3>;
-  using Control = cairn::NoControl;
-  double sigma;  ///< [m] a step
-  [[nodiscard]] State propagate(const State& x, const Control&, double) const { return x; }
-  [[nodiscard]] cairn::Identity<3> jacobian(const State&, const Control&, double) const { return {}; }
-  [[nodiscard]] cairn::Matrix<3> noise(const State&, const Control&, double) const {
-    return sigma * sigma * cairn::Matrix<3>::Identity();
-  }
-};
-
-/// A stereo pair sees where a landmark is: H = I, R the anisotropic covariance of the triangulation.
-struct SeenAt {
-  static constexpr bool linear = true;
-  using State = cairn::Vector<3>;
-  using Measurement = cairn::Vector<3>;
-  cairn::Matrix<3> R;
-  [[nodiscard]] Measurement predict(const State& x) const { return x; }
-  [[nodiscard]] cairn::Identity<3> jacobian(const State&) const { return {}; }
-  [[nodiscard]] const cairn::Matrix<3>& noise(const State&) const { return R; }
-};
+/// What the work returns; adds the time it took to a stage of a frame's record.
+template <class Work>
+auto timed(FrameRecord& record, Stage stage, const Work& work) {
+  using Clock = std::chrono::steady_clock;
+  struct Timer {
+    double& milliseconds;
+    Clock::time_point start = Clock::now();
+    ~Timer() { milliseconds += std::chrono::duration<double, std::milli>(Clock::now() - start).count(); }
+  };
+  const Timer timer{record.milliseconds[static_cast<std::size_t>(stage)]};
+  return work();
+}
 
 FeatureOptions feature_options(const PipelineOptions& options) {
   return {.kind = options.features,
@@ -78,10 +49,11 @@ cairn::TriangulationOptions triangulation_options(const PipelineOptions& options
   return triangulation;
 }
 
-float squared_distance(std::span<const float> a, std::span<const float> b) {
-  float sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
-  return sum;
+cairn::KeyframeMapOptions map_options(const PipelineOptions& options) {
+  cairn::KeyframeMapOptions map = options.map;
+  map.min_matches = options.min_inliers;
+
+  return map;
 }
 
 }  // namespace
@@ -95,6 +67,7 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options)
       triangulate_(rig, triangulation_options(options, rig)),
       calibration_(rig, options.calibration),
       store_(make_landmark_store(store_options(options))),
+      map_(rig, map_options(options)),
       pose_covariance_(cairn::Matrix<6>::Zero()) {
   record_.seed = options.seed;
   record_.threads = options.threads;
@@ -118,29 +91,14 @@ const FrameRecord& Pipeline::work_on(const StereoFrame& frame, double load_milli
   result.index = frame.index;
   result.time = frame.time;
   result.milliseconds[static_cast<std::size_t>(Stage::load)] = load_milliseconds;
-  {
-    const StageTimer timer(result, Stage::total);
-    detect(frame);
-    find_local_landmarks(frame);
-    std::vector<Match> matches = match_with_map();
-    const std::optional<Located> located = locate(matches);
-    if (located) {
-      move_to(located->pose);
-      refine_landmarks(located->agreed);
-      extend_map(located->agreed, frame);
-      close_step();
-      if (options_.calibrate) calibrate(located->agreed);
-    } else {
-      stay();
-      record_.notes.push_back(frame.name + ": lost, " + std::to_string(matches.size()) +
-                              " matches with the map do not agree on a pose; the last pose is kept");
-    }
-    if (record_.frames.size() == options_.sample_frame + 1)
-      keep_sample(frame, matches, located ? located->agreed : std::vector<Match>());
-    result.tracked = located.has_value();
-    result.map_matches = static_cast<int>(matches.size());
-    result.inliers = located ? static_cast<int>(located->agreed.size()) : 0;
-  }
+  timed(result, Stage::total, [&] {
+    timed(result, Stage::detect, [&] { detect(frame); });
+    timed(result, Stage::stereo, [&] { find_local_landmarks(frame); });
+    if (map_.empty())
+      begin(frame, result);
+    else
+      follow(frame, result);
+  });
   if (frame.truth) {
     if (!T_truth_world_) T_truth_world_ = *frame.truth * T_world_camera_.inverse();
     result.truth = T_truth_world_->inverse() * *frame.truth;
@@ -148,38 +106,99 @@ const FrameRecord& Pipeline::work_on(const StereoFrame& frame, double load_milli
   result.points_left = static_cast<int>(left_->size());
   result.points_right = static_cast<int>(right_->size());
   result.stereo_matches = static_cast<int>(locals_.size());
+  result.T_world_camera = T_world_camera_;
+  result.covariance = pose_covariance_;
   result.landmarks = landmarks_.size();
+  result.keyframes = map_.keyframe_count();
   ++step_;
   return result;
 }
 
+/// The first frame that shows enough is where the world begins.
+void Pipeline::begin(const StereoFrame& frame, FrameRecord& result) {
+  result.tracked = locals_.size() >= options_.min_inliers;
+  if (!result.tracked) return lose(frame, 0);
+  timed(result, Stage::store, [&] {
+    choose_calibration();
+    map_.begin(T_world_camera_);
+    add_landmarks({}, frame);
+    close_step();
+  });
+  pose_covariance_ = cairn::Matrix<6>::Identity() * (options_.map.first_sigma * options_.map.first_sigma);
+  result.keyframe = true;
+}
+
+/// Whether the rig is to be part of the map's joint state.
+void Pipeline::choose_calibration() {
+  CalibrationRecord& record = record_.calibration;
+  record.on = options_.calibrate == Calibration::on || options_.calibrate == Calibration::drifting;
+  record.why = std::string("asked for: ") + calibration_names[static_cast<std::size_t>(options_.calibrate)];
+  if (options_.calibrate == Calibration::automatic) {
+    std::vector<cairn::PixelPair> pairs;
+    for (const LocalLandmark& local : locals_) pairs.push_back({local.left_pixel, local.right_pixel});
+    const VerticalDisparity seen = vertical_disparity(rig_, pairs);
+    record.on = seen.shows();
+    const auto part = [](double value, double sigma) {
+      return cairn::shortest(std::round(1e3 * value) / 1e3) + " +- " +
+             cairn::shortest(std::round(1e3 * sigma) / 1e3);
+    };
+    record.why = "vertical disparity " + part(seen.offset, seen.sigma_offset) + ", over half a width " +
+                 part(seen.slope_x, seen.sigma_x) + ", over half a height " +
+                 part(seen.slope_y, seen.sigma_y) + " pixels";
+  }
+  if (!record.on || options_.calibrate == Calibration::drifting) return;
+  cairn::KeyframeMapOptions with_rig = map_options(options_);
+  with_rig.rig_sigma = options_.rig_sigma;
+  map_ = cairn::KeyframeMap(rig_, with_rig);
+}
+
+/// Every other frame: where it is, and what the map learns by it.
+void Pipeline::follow(const StereoFrame& frame, FrameRecord& result) {
+  std::vector<Match> matches = timed(result, Stage::match, [&] { return match_with_map(); });
+  const std::optional<Located> located = timed(result, Stage::pose, [&] { return locate(matches); });
+  result.tracked = located.has_value();
+  result.map_matches = static_cast<int>(matches.size());
+  if (record_.frames.size() == options_.sample_frame + 1)
+    keep_sample(frame, matches, located ? located->agreed : std::vector<Match>());
+  if (!located) return lose(frame, matches.size());
+  result.inliers = static_cast<int>(located->agreed.size());
+  move_to(*located, result);
+  if (wants_keyframe(located->agreed.size()))
+    timed(result, Stage::update, [&] { make_keyframe(*located, frame, result); });
+  timed(result, Stage::store, [&] { close_step(); });
+  if (options_.calibrate == Calibration::drifting)
+    timed(result, Stage::update, [&] { calibrate(located->agreed); });
+}
+
+void Pipeline::lose(const StereoFrame& frame, std::size_t matches) {
+  T_last_camera_ = cairn::SE3();
+  record_.notes.push_back(frame.name + ": lost, " + std::to_string(matches) +
+                          " matches with the map do not agree on a pose; the last pose is kept");
+}
+
 /// Interest points of both images, one thread each.
 void Pipeline::detect(const StereoFrame& frame) {
-  const StageTimer timer(record_.frames.back(), Stage::detect);
   cairn::parallel_for(2, options_.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t side = begin; side < end; ++side)
       (side == 0 ? left_ : right_) = side == 0 ? &extract_left_(frame.left) : &extract_right_(frame.right);
   });
 }
 
-/// Stereo pairs become points in space with the anisotropic covariance of their triangulation.
+/// The stereo pairs that make points in space.
 void Pipeline::find_local_landmarks(const StereoFrame& frame) {
-  const StageTimer timer(record_.frames.back(), Stage::stereo);
   const std::vector<PointPair> pairs =
       match_stereo_(frame.left, *left_, frame.right, *right_, options_.threads);
   locals_.clear();
   for (const PointPair& pair : pairs) {
-    const double growth = std::max(1.0F, left_->keypoints[pair.left].scale / options_.fine_scale);
-    const double sigma = options_.pixel_sigma * growth;
-    const cairn::Triangulation point = triangulate_(pair.left_pixel, pair.right_pixel, sigma, sigma);
-    if (!point.good()) continue;
-    locals_.push_back({pair.left, pair.left_pixel, pair.right_pixel, sigma, point.point, point.covariance});
+    const double scale = left_->keypoints[pair.left].scale;
+    const double sigma = options_.pixel_sigma * std::pow(scale, options_.scale_exponent);
+    if (!triangulate_(pair.left_pixel, pair.right_pixel, sigma, sigma).good()) continue;
+    locals_.push_back({pair.left, pair.left_pixel, pair.right_pixel, sigma});
   }
 }
 
 /// The landmark of the map that looks like each local one, where one clearly does. (thesis 1.4: ratio test)
 std::vector<Pipeline::Match> Pipeline::match_with_map() const {
-  const StageTimer timer(record_.frames.back(), Stage::match);
   std::vector<Look> looks;
   looks.reserve(locals_.size());
   for (const LocalLandmark& local : locals_)
@@ -200,187 +219,156 @@ std::vector<Pipeline::Match> Pipeline::match_with_map() const {
 }
 
 /// RANSAC over the matches, a second look for landmarks that the pose says must be in view, and the last word
-/// to the earliest of those that agree.
-std::optional<Pipeline::Located> Pipeline::locate(std::vector<Match>& matches) const {
-  const StageTimer timer(record_.frames.back(), Stage::pose);
-  if (landmarks_.size() == 0) {  // the first frame that shows anything is where the world begins
-    if (locals_.size() < options_.min_inliers) return std::nullopt;
-    Located start;
-    start.pose.T_world_camera = T_world_camera_;
-    return start;
-  }
+/// to the joint covariance of the keyframes that all of them rest on.
+std::optional<Pipeline::Located> Pipeline::locate(std::vector<Match>& matches) {
   const cairn::PosePrior prediction{predicted_pose()};
-  cairn::StereoPose pose =
+  const cairn::StereoPose pose =
       cairn::estimate_stereo_pose(rig_, observations(matches), pose_options(), prediction);
   if (!pose.good()) return std::nullopt;
-  second_look(pose.T_world_camera, matches);
-  earliest_first(matches);
-  pose = cairn::refine_stereo_pose(rig_, observations(matches), pose.T_world_camera, pose_options());
-  if (!pose.good()) return std::nullopt;
+  look_again(pose, matches);
   Located located;
+  located.sightings = sightings(matches);
+  located.location = map_.locate(pose.T_world_camera, located.sightings);
+  if (!located.location.good()) return std::nullopt;
   for (std::size_t i = 0; i < matches.size(); ++i)
-    if (pose.inliers[i] != 0) located.agreed.push_back(matches[i]);
-  located.pose = decide_by_earliest(located.agreed, pose);
+    if (located.location.inliers[i] != 0) located.agreed.push_back(matches[i]);
   return located;
 }
 
-/// Looks around where the pose says a landmark is for a local one that looks like it. Finds those that the
-/// ratio test dropped because two landmarks look alike; without it they would enter the map a second time.
-void Pipeline::second_look(const cairn::SE3& T_world_camera, std::vector<Match>& matches) const {
+/// Landmarks that the keyframes in play saw, and no local one is taken for yet, are searched for where the
+/// pose says they are.
+void Pipeline::look_again(const cairn::StereoPose& pose, std::vector<Match>& matches) {
   std::vector<std::uint8_t> taken(locals_.size(), 0);
-  std::vector<LandmarkId> known;
-  for (const Match& match : matches) {
-    taken[match.local] = 1;
-    known.push_back(match.landmark);
+  std::vector<LandmarkId> known, in_play;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    taken[matches[i].local] = 1;
+    known.push_back(matches[i].landmark);
+    if (pose.inliers[i] != 0) in_play.push_back(matches[i].landmark);
   }
   std::ranges::sort(known);
-  std::vector<std::uint32_t> by_row;
+  std::vector<FreePoint> points;
   for (std::uint32_t i = 0; i < locals_.size(); ++i)
-    if (taken[i] == 0) by_row.push_back(i);
-  const auto row = [&](std::uint32_t i) { return locals_[i].left_pixel(1); };
-  std::ranges::sort(by_row, [&](auto a, auto b) { return std::pair(row(a), a) < std::pair(row(b), b); });
-
-  struct Candidate {
-    float distance;
-    std::uint32_t local;
-    LandmarkId landmark;
-    auto operator<=>(const Candidate&) const = default;
-  };
-  const double radius = options_.second_look_radius;
-  const float most = static_cast<float>(options_.store.max_distance * options_.store.max_distance);
-  const cairn::SE3 T_camera_world = T_world_camera.inverse();
-  const cairn::Matrix<3> R = T_camera_world.rotation().matrix();
-  std::vector<Candidate> candidates;
-  for (const Landmark& landmark : landmarks_.all()) {
-    const cairn::Vector<3> p = R * landmark.position.mean + T_camera_world.translation();
-    if (p(2) < rig_.baseline() || std::ranges::binary_search(known, landmark.id)) continue;
-    const auto pixels = rig_.project(p);
-    if (!pixels || !rig_.left.contains(pixels->head<2>())) continue;
-    auto near = std::ranges::lower_bound(by_row, (*pixels)(1) - radius, {}, row);
-    for (; near != by_row.end() && row(*near) <= (*pixels)(1) + radius; ++near) {
-      const LocalLandmark& local = locals_[*near];
-      if ((local.left_pixel - pixels->head<2>()).squaredNorm() > radius * radius) continue;
-      if ((local.right_pixel - pixels->tail<2>()).squaredNorm() > radius * radius) continue;
-      if (left_->keypoints[local.point].laplacian != landmark.sign) continue;
-      const float distance = squared_distance(left_->descriptor(local.point), landmark.descriptor);
-      if (distance <= most) candidates.push_back({distance, *near, landmark.id});
-    }
+    if (taken[i] == 0)
+      points.push_back({i,
+                        locals_[i].left_pixel,
+                        locals_[i].right_pixel,
+                        {left_->descriptor(locals_[i].point), left_->keypoints[locals_[i].point].laplacian}});
+  std::vector<ExpectedLandmark> expected;
+  for (const LandmarkId id : map_.seen_with(in_play)) {
+    if (std::ranges::binary_search(known, id)) continue;
+    const Landmark& landmark = landmarks_[id];
+    if (const auto position = map_.landmark(id))
+      expected.push_back({id, position->mean, {landmark.descriptor, landmark.sign}});
   }
-  std::ranges::sort(candidates);
-  std::vector<LandmarkId> given;
-  for (const Candidate& candidate : candidates) {
-    if (taken[candidate.local] != 0 || std::ranges::find(given, candidate.landmark) != given.end()) continue;
-    taken[candidate.local] = 1;
-    given.push_back(candidate.landmark);
-    matches.push_back({candidate.local, candidate.landmark});
-  }
+  GuidedMatchingOptions guided = options_.second_look;
+  guided.max_distance = options_.store.max_distance;
+  for (const GuidedMatch& match :
+       match_guided(rig_, pose.T_world_camera, std::move(points), expected, guided))
+    matches.push_back({match.point, match.landmark});
 }
 
-/// The pose by as few of the earliest landmarks as determine it about as well as all of them do. (thesis 3.5)
-cairn::StereoPose Pipeline::decide_by_earliest(const std::vector<Match>& agreed,
-                                               const cairn::StereoPose& all) const {
-  for (std::size_t count = options_.earliest; count < agreed.size(); count *= 2) {
-    // Landmarks of one step stand together: take the whole of the step that the count reaches.
-    const int last_step = landmarks_[agreed[count - 1].landmark].first_seen;
-    std::size_t end = count;
-    while (end < agreed.size() && landmarks_[agreed[end].landmark].first_seen == last_step) ++end;
-    const cairn::StereoPose pose = cairn::refine_stereo_pose(rig_, observations(std::span(agreed).first(end)),
-                                                             all.T_world_camera, pose_options());
-    constexpr double much_vaguer = 9;  // in variance, along the worst direction
-    if (pose.good() &&
-        (pose.covariance.diagonal().array() <= much_vaguer * all.covariance.diagonal().array()).all())
-      return pose;
-  }
-  return all;
-}
-
-void Pipeline::move_to(const cairn::StereoPose& pose) {
-  T_last_camera_ = T_world_camera_.inverse() * pose.T_world_camera;
-  T_world_camera_ = pose.T_world_camera;
-  pose_covariance_ = pose.covariance;
-  record_pose();
-}
-
-void Pipeline::stay() {
-  T_last_camera_ = cairn::SE3();
-  record_pose();
-}
-
-void Pipeline::record_pose() {
-  record_.frames.back().T_world_camera = T_world_camera_;
-  record_.frames.back().covariance = pose_covariance_;
-}
-
-/// Kalman filter of every landmark that was seen. Its R holds the pose's error too. (notes 11.4)
-void Pipeline::refine_landmarks(const std::vector<Match>& agreed) {
-  const StageTimer timer(record_.frames.back(), Stage::update);
-  const cairn::Kalman filter{.gate = options_.landmark_gate};
-  for (const Match& match : agreed) {
+void Pipeline::move_to(const Located& located, FrameRecord& result) {
+  const cairn::MapLocation& here = located.location;
+  T_last_camera_ = T_world_camera_.inverse() * here.T_world_camera;
+  T_world_camera_ = here.T_world_camera;
+  pose_covariance_ = here.covariance;
+  result.fit = noise_factors_.observe(here);
+  map_.set_variance_factors(noise_factors_.pixels(), noise_factors_.poses());
+  for (const Match& match : located.agreed) {
     Landmark& landmark = landmarks_[match.landmark];
-    const LocalLandmark& local = locals_[match.local];
-    const cairn::Gaussian<cairn::Vector<3>> seen = in_world(local);
-    const double sigma = options_.landmark_noise * local.position(2);
-    if (filter.predict(landmark.position, StandingStill{sigma}, 1.0) != cairn::Status::accepted) continue;
-    if (!filter.update(landmark.position, SeenAt{seen.covariance}, seen.mean).accepted()) continue;
     ++landmark.sightings;
-    landmark.seen(step_, local.left_pixel, local.right_pixel);
+    landmark.last_seen = step_;
     store_->sighted(match.landmark);
   }
 }
 
+/// Whether much less of what is seen is known than was at best since the last keyframe.
+bool Pipeline::wants_keyframe(std::size_t agreed) {
+  const double share = static_cast<double>(agreed) / static_cast<double>(locals_.size());
+  best_share_ = std::max(best_share_, share);
+  return share < options_.keyframe_share * best_share_;
+}
+
+void Pipeline::make_keyframe(const Located& located, const StereoFrame& frame, FrameRecord& result) {
+  if (!map_.add_keyframe(located.location, located.sightings)) return;
+  if (map_.rig_correction()) look_through(map_.rig());
+  add_landmarks(located.agreed, frame);
+  result.keyframe = true;
+  best_share_ = 0;
+}
+
 /// Local landmarks without a partner are new.
-void Pipeline::extend_map(const std::vector<Match>& agreed, const StereoFrame& frame) {
-  const StageTimer timer(record_.frames.back(), Stage::store);
-  std::vector<std::uint8_t> known(locals_.size(), 0);
-  for (const Match& match : agreed) known[match.local] = 1;
-  for (std::size_t i = 0; i < locals_.size(); ++i) {
-    if (known[i] != 0) continue;
-    const LocalLandmark& local = locals_[i];
-    const cairn::Keypoint& point = left_->keypoints[local.point];
+void Pipeline::add_landmarks(const std::vector<Match>& known, const StereoFrame& frame) {
+  std::vector<std::uint8_t> taken(locals_.size(), 0);
+  for (const Match& match : known) taken[match.local] = 1;
+  for (std::uint32_t i = 0; i < locals_.size(); ++i) {
+    if (taken[i] != 0) continue;
+    const cairn::Keypoint& point = left_->keypoints[locals_[i].point];
+    const std::span<const float> look = left_->descriptor(locals_[i].point);
     Landmark landmark;
-    landmark.id = store_->add({left_->descriptor(local.point), point.laplacian});
-    landmark.position = in_world(local);
-    const std::span<const float> look = left_->descriptor(local.point);
+    landmark.id = store_->add({look, point.laplacian});
+    if (!map_.add_landmark(sighting(i, landmark.id))) {
+      store_->erase(landmark.id);
+      continue;
+    }
     landmark.descriptor.assign(look.begin(), look.end());
     landmark.sign = point.laplacian;
     landmark.grey =
         frame.left(static_cast<int>(std::lround(point.x)), static_cast<int>(std::lround(point.y)));
-    landmark.first_seen = step_;
-    landmark.seen(step_, local.left_pixel, local.right_pixel);
+    landmark.first_seen = landmark.last_seen = step_;
     landmarks_.add(std::move(landmark));
   }
 }
 
-/// Promotion, expiry, insertion.
+/// Promotion, expiry, insertion, and what the map gave up by itself.
 void Pipeline::close_step() {
-  const StageTimer timer(record_.frames.back(), Stage::store);
-  for (const LandmarkId id : store_->advance()) landmarks_.remove(id);
+  for (const LandmarkId id : map_.take_dropped()) {
+    store_->erase(id);
+    landmarks_.remove(id);
+  }
+  keep_bounded();
+  for (const LandmarkId id : store_->advance()) {
+    map_.forget(id);
+    landmarks_.remove(id);
+  }
+}
+
+/// Over the cap those leave that were seen least often, of these the ones not seen for longest.
+void Pipeline::keep_bounded() {
+  if (landmarks_.size() <= options_.max_landmarks) return;
+  std::vector<std::tuple<int, int, LandmarkId>> order;
+  for (const Landmark& landmark : landmarks_.all())
+    order.emplace_back(landmark.sightings, landmark.last_seen, landmark.id);
+  const auto surplus = static_cast<std::ptrdiff_t>(landmarks_.size() - options_.max_landmarks);
+  std::ranges::nth_element(order, order.begin() + surplus);
+  for (auto gone = order.begin(); gone != order.begin() + surplus; ++gone) {
+    const LandmarkId id = std::get<2>(*gone);
+    map_.forget(id);
+    store_->erase(id);
+    landmarks_.remove(id);
+  }
 }
 
 /// What the landmarks' motion in the images says of the rig.
 void Pipeline::calibrate(const std::vector<Match>& agreed) {
-  const StageTimer timer(record_.frames.back(), Stage::update);
-  std::vector<Sighting> sightings;
-  sightings.reserve(agreed.size());
+  std::vector<Sighting> seen;
+  seen.reserve(agreed.size());
   for (const Match& match : agreed) {
     const LocalLandmark& local = locals_[match.local];
-    sightings.push_back({match.landmark, local.left_pixel, local.right_pixel, local.sigma});
+    seen.push_back({match.landmark, local.left_pixel, local.right_pixel, local.sigma});
   }
-  if (calibration_.observe(T_world_camera_, std::move(sightings))) take_rig(calibration_.rig());
+  if (calibration_.observe(T_world_camera_, std::move(seen))) take_rig(calibration_.rig());
 }
 
-/// Another rig puts what was seen elsewhere: landmarks move as their last sighting does.
+/// Another rig puts what was seen elsewhere; the map computes its landmarks anew from their sightings.
 void Pipeline::take_rig(const cairn::StereoRig& rig) {
-  const cairn::Triangulator triangulate(rig, triangulation_options(options_, rig));
-  for (Landmark& landmark : landmarks_.all()) {
-    const cairn::Triangulation before = triangulate_(landmark.left_pixel, landmark.right_pixel);
-    const cairn::Triangulation after = triangulate(landmark.left_pixel, landmark.right_pixel);
-    if (!before.good() || !after.good()) continue;
-    const cairn::SE3& pose = record_.frames[static_cast<std::size_t>(landmark.last_seen)].T_world_camera;
-    landmark.position.mean += pose.rotation() * (after.point - before.point);
-  }
+  look_through(rig);
+  map_.set_rig(rig);
+}
+
+void Pipeline::look_through(const cairn::StereoRig& rig) {
   rig_ = rig;
-  triangulate_ = triangulate;
+  triangulate_ = cairn::Triangulator(rig, triangulation_options(options_, rig));
   match_stereo_ = StereoMatcher(rig, options_.stereo);
 }
 
@@ -390,25 +378,30 @@ void Pipeline::earliest_first(std::vector<Match>& matches) const {
   });
 }
 
-std::vector<cairn::StereoMatch> Pipeline::observations(std::span<const Match> matches) const {
+/// The matches as a pose is estimated from them; those whose landmark the map gave up are taken out.
+std::vector<cairn::StereoMatch> Pipeline::observations(std::vector<Match>& matches) {
   std::vector<cairn::StereoMatch> result;
   result.reserve(matches.size());
-  for (const Match& match : matches) {
+  std::erase_if(matches, [&](const Match& match) {
     const LocalLandmark& local = locals_[match.local];
-    const Landmark& landmark = landmarks_[match.landmark];
-    result.push_back({landmark.position.mean, landmark.position.covariance, local.left_pixel,
-                      local.right_pixel, local.sigma, local.sigma});
-  }
+    const auto landmark = map_.landmark(match.landmark);
+    if (landmark)
+      result.push_back({landmark->mean, landmark->covariance, local.left_pixel, local.right_pixel,
+                        local.sigma, local.sigma});
+    return !landmark;
+  });
   return result;
 }
 
-/// A local landmark in the world: R Sigma R^T + J P J^T, J = R [I, -skew(p)] the derivative by the pose.
-cairn::Gaussian<cairn::Vector<3>> Pipeline::in_world(const LocalLandmark& local) const {
-  const cairn::Matrix<3> R = T_world_camera_.rotation().matrix();
-  cairn::Matrix<3, 6> J;
-  J << R, -R * cairn::skew(local.position);
-  return {T_world_camera_ * local.position,
-          cairn::symmetrised(R * local.covariance * R.transpose() + J * pose_covariance_ * J.transpose())};
+cairn::StereoSighting Pipeline::sighting(std::uint32_t local, LandmarkId landmark) const {
+  return {landmark, locals_[local].left_pixel, locals_[local].right_pixel, locals_[local].sigma};
+}
+
+std::vector<cairn::StereoSighting> Pipeline::sightings(std::span<const Match> matches) const {
+  std::vector<cairn::StereoSighting> result;
+  result.reserve(matches.size());
+  for (const Match& match : matches) result.push_back(sighting(match.local, match.landmark));
+  return result;
 }
 
 cairn::SE3 Pipeline::predicted_pose() const {
@@ -436,12 +429,22 @@ void Pipeline::keep_sample(const StereoFrame& frame, const std::vector<Match>& m
   record_.sample = std::move(sample);
 }
 
-RunRecord Pipeline::record() const {
+RunRecord Pipeline::record() {
   RunRecord record = record_;
+  record.variance_factor = noise_factors_.poses();
+  if (const auto rig = map_.rig_correction()) {
+    record.calibration.numbers = rig->mean;
+    for (int i = 0; i < 5; ++i) record.calibration.sigmas(i) = std::sqrt(rig->covariance(i, i));
+  } else if (options_.calibrate == Calibration::drifting) {
+    record.calibration.numbers = calibration_.drift().state();
+    for (int i = 0; i < 5; ++i)
+      record.calibration.sigmas(i) = std::sqrt(calibration_.drift().covariance()(i, i));
+  }
   record.landmarks.reserve(landmarks_.size());
   for (const Landmark& landmark : landmarks_.all())
-    record.landmarks.push_back({landmark.position.mean, landmark.position.covariance, landmark.grey,
-                                step_ - 1 - landmark.first_seen, landmark.sightings});
+    if (const auto position = map_.landmark_in_world(landmark.id))
+      record.landmarks.push_back({position->mean, position->covariance, landmark.grey,
+                                  step_ - 1 - landmark.first_seen, landmark.sightings});
   return record;
 }
 

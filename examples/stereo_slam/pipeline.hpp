@@ -4,15 +4,16 @@
 /// @file
 /// Stereo landmark SLAM, one step a frame, box by box:
 ///
-///   frames -> points -> stereo pairs -> local landmarks -> matches with the map -> pose -> landmark filters
-///   -> map
+///   frames -> points -> stereo pairs -> local landmarks -> matches with the map -> pose -> keyframe -> map
 ///
 /// World = the left camera of the first frame. The pose is always found against the map, never against the
-/// last frame, so errors do not add up while the same landmarks are in view. Of the matches that agree, the
-/// landmarks seen EARLIEST decide, because they carry the least accumulated error: that is what closes a
-/// loop.
+/// last frame, so errors do not add up while the same landmarks are in view. The map is one joint Gaussian
+/// over the poses of keyframes with landmarks that follow from them (cairn/slam/keyframe_map.hpp): where old
+/// and drifted landmarks are in view together the old ones decide, because the covariance says that they are
+/// known better. That is what closes a loop, and what makes the pose's own covariance true.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -25,17 +26,30 @@
 #include <cairn/geometry/stereo_rig.hpp>
 #include <cairn/geometry/triangulation.hpp>
 #include <cairn/manifold/se3.hpp>
+#include <cairn/slam/keyframe_map.hpp>
 #include <cairn/vision/features.hpp>
 
 #include "dataset.hpp"
 #include "feature_choice.hpp"
+#include "guided_matching.hpp"
 #include "landmark_store.hpp"
 #include "landmarks.hpp"
+#include "noise_factors.hpp"
 #include "run_record.hpp"
 #include "self_calibration.hpp"
 #include "stereo_matcher.hpp"
+#include "vertical_disparity.hpp"
 
 namespace stereo_slam {
+
+/// Whether the rig's calibration is corrected while moving.
+enum class Calibration {
+  automatic,  ///< on where the first frame's vertical disparity shows that it is off (vertical_disparity.hpp)
+  on,         ///< a part of the map's joint state: for rigs that are not quite what their file says
+  off,
+  drifting  ///< followed frame by frame (self_calibration.hpp): for rigs that come loose
+};
+inline constexpr std::array<const char*, 4> calibration_names{"auto", "on", "off", "drifting"};
 
 struct PipelineOptions {
   std::uint64_t seed = 1;
@@ -47,19 +61,22 @@ struct PipelineOptions {
   StoreOptions store;
   StereoMatcherOptions stereo;
 
-  bool calibrate = false;  ///< correct the rig's calibration while moving (self_calibration.hpp)
+  Calibration calibrate = Calibration::automatic;
+  double rig_sigma =
+      5e-4;  ///< of each of the rig's five numbers, where they are estimated with the map [rad]
   cairn::CalibrationDriftOptions calibration = {
       .initial_sigma = 2e-4, .walk_rotation = 1e-5, .walk_baseline = 1e-6};
 
-  double pixel_sigma = 0.7;       ///< noise of a point's coordinates at the finest scale [pixels]
-  float fine_scale = 4;           ///< up to this scale; above, the noise grows with it [pixels]
-  double second_look_radius = 8;  ///< search for known landmarks around where the pose predicts them [pixels]
-  std::size_t earliest = 100;     ///< so many of the earliest agreeing landmarks decide the pose
-  std::size_t min_inliers = 10;   ///< fewer: the frame is lost
+  double pixel_sigma = 0.35;     ///< noise of the coordinates of a point of scale 1 [pixels]
+  double scale_exponent = 0.65;  ///< it grows with this power of the scale
+  GuidedMatchingOptions second_look;
+  std::size_t min_inliers = 10;          ///< fewer: the frame is lost
   double max_depth_over_baseline = 150;  ///< farther points are too vague to keep
-  double landmark_noise =
-      5e-4;  ///< added to a landmark in a step, over its depth: calibrations are not exact
-  double landmark_gate = 16.27;  ///< NIS of a sighting, chi-square of 3 degrees of freedom at 0.999
+  /// A frame becomes a keyframe when the share of its points that the map knows falls below this part of what
+  /// it was at best since the last one.
+  double keyframe_share = 0.8;
+  std::size_t max_landmarks = 40000;  ///< the least seen leave when there are more
+  cairn::KeyframeMapOptions map;
   std::size_t sample_frame = 0;  ///< the frame shown with its matches in the report
 };
 
@@ -73,16 +90,14 @@ public:
   const FrameRecord& step(const StereoFrame& frame, double load_milliseconds = 0);
 
   /// Everything that happened, with the map as it stands now.
-  [[nodiscard]] RunRecord record() const;
+  [[nodiscard]] RunRecord record();
 
 private:
   /// A point of the left image whose place is known in the camera's frame.
   struct LocalLandmark {
     std::uint32_t point;  ///< of the left image
     cairn::Vector<2> left_pixel, right_pixel;
-    double sigma;               ///< of each pixel coordinate
-    cairn::Vector<3> position;  ///< left camera frame
-    cairn::Matrix<3> covariance;
+    double sigma;  ///< of each pixel coordinate
   };
   /// A local landmark and the landmark of the map it is taken for.
   struct Match {
@@ -90,9 +105,10 @@ private:
     LandmarkId landmark;
   };
 
-  /// Where the camera is, and the matches that say so, earliest landmarks first. Nothing where it is lost.
+  /// Where the camera is, and what says so. Nothing where it is lost.
   struct Located {
-    cairn::StereoPose pose;
+    cairn::MapLocation location;
+    std::vector<cairn::StereoSighting> sightings;  ///< one a match
     std::vector<Match> agreed;
   };
 
@@ -101,22 +117,26 @@ private:
   void find_local_landmarks(const StereoFrame& frame);
   [[nodiscard]] std::vector<Match> match_with_map() const;
   /// Adds to `matches` what the second look finds.
-  [[nodiscard]] std::optional<Located> locate(std::vector<Match>& matches) const;
-  void move_to(const cairn::StereoPose& pose);
-  void stay();
-  void record_pose();
-  void refine_landmarks(const std::vector<Match>& agreed);
-  void extend_map(const std::vector<Match>& agreed, const StereoFrame& frame);
+  [[nodiscard]] std::optional<Located> locate(std::vector<Match>& matches);
+  void begin(const StereoFrame& frame, FrameRecord& result);
+  void choose_calibration();
+  void follow(const StereoFrame& frame, FrameRecord& result);
+  void lose(const StereoFrame& frame, std::size_t matches);
+  void move_to(const Located& located, FrameRecord& result);
+  [[nodiscard]] bool wants_keyframe(std::size_t agreed);
+  void make_keyframe(const Located& located, const StereoFrame& frame, FrameRecord& result);
+  void add_landmarks(const std::vector<Match>& known, const StereoFrame& frame);
   void close_step();
+  void keep_bounded();
   void calibrate(const std::vector<Match>& agreed);
   void take_rig(const cairn::StereoRig& rig);
+  void look_through(const cairn::StereoRig& rig);
 
-  void second_look(const cairn::SE3& T_world_camera, std::vector<Match>& matches) const;
-  [[nodiscard]] cairn::StereoPose decide_by_earliest(const std::vector<Match>& agreed,
-                                                     const cairn::StereoPose& all) const;
+  void look_again(const cairn::StereoPose& pose, std::vector<Match>& matches);
   void earliest_first(std::vector<Match>& matches) const;
-  [[nodiscard]] std::vector<cairn::StereoMatch> observations(std::span<const Match> matches) const;
-  [[nodiscard]] cairn::Gaussian<cairn::Vector<3>> in_world(const LocalLandmark& local) const;
+  [[nodiscard]] std::vector<cairn::StereoMatch> observations(std::vector<Match>& matches);
+  [[nodiscard]] std::vector<cairn::StereoSighting> sightings(std::span<const Match> matches) const;
+  [[nodiscard]] cairn::StereoSighting sighting(std::uint32_t local, LandmarkId landmark) const;
   [[nodiscard]] cairn::SE3 predicted_pose() const;
   [[nodiscard]] cairn::StereoPoseOptions pose_options() const;
   void keep_sample(const StereoFrame& frame, const std::vector<Match>& matches,
@@ -132,13 +152,16 @@ private:
   SelfCalibration calibration_;
   std::unique_ptr<LandmarkStore> store_;
   Landmarks landmarks_;
+  cairn::KeyframeMap map_;
+  NoiseFactors noise_factors_;
+  double best_share_ = 0;  // of a frame's points that the map knew, since the last keyframe
   std::vector<LocalLandmark> locals_;
   cairn::SE3 T_world_camera_;
   cairn::SE3 T_last_camera_;  // motion of the last step, for the prediction
   cairn::Matrix<6> pose_covariance_;
   std::optional<cairn::SE3> T_truth_world_;  // from this run's world to the truth's
   int step_ = 0;
-  mutable RunRecord record_;  // const stages add their times
+  RunRecord record_;
 };
 
 }  // namespace stereo_slam

@@ -37,6 +37,9 @@ struct FrameRecord {
   int map_matches = 0;
   int inliers = 0;
   std::size_t landmarks = 0;  ///< in the map after this frame
+  std::size_t keyframes = 0;  ///< the same
+  bool keyframe = false;      ///< this frame became one
+  double fit = 0;             ///< median chi^2 of the inliers over what right sigmas make it; 0: none
   std::array<double, stage_names.size()> milliseconds{};
 };
 
@@ -67,6 +70,13 @@ struct SampleFrame {
   std::vector<SamplePoint> points;
 };
 
+/// The rig's calibration: whether it was corrected, why, and by how much.
+struct CalibrationRecord {
+  bool on = false;
+  std::string why;
+  cairn::Vector<5> numbers = cairn::Vector<5>::Zero(), sigmas = cairn::Vector<5>::Zero();  ///< [rad]
+};
+
 struct RunRecord {
   std::string dataset;
   std::string features, store;
@@ -76,6 +86,8 @@ struct RunRecord {
   double seconds = 0;  ///< wall time of the whole run
   std::vector<FrameRecord> frames;
   std::vector<LandmarkRecord> landmarks;
+  CalibrationRecord calibration;
+  double variance_factor = 1;  ///< by which variances are larger than the pixel sigma says, at the end
   std::optional<SampleFrame> sample;
   std::vector<std::string> notes;          ///< what the reader should know: skipped frames, lost frames
   std::optional<std::string> ended_early;  ///< after which frame the run ended and why, where it did

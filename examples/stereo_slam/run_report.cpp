@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include <cairn/core/statistics.hpp>
+
 #include "support/image_io.hpp"
 
 namespace stereo_slam {
@@ -63,6 +65,7 @@ void add_figures(example::Report& report, const Summary& summary) {
                  summary.frames_lost == 0 ? Verdict::good : Verdict::bad});
   report.figure({"path", readable(summary.path), "m", ""});
   report.figure({"landmarks", std::to_string(summary.landmarks), "", "in the map at the end"});
+  report.figure({"keyframes", std::to_string(summary.keyframes), "", "in the map at the end"});
   report.figure({"inliers", readable(summary.inliers), "", "median of a frame"});
   if (!summary.errors) return;
   const TruthErrors& errors = *summary.errors;
@@ -76,6 +79,10 @@ void add_figures(example::Report& report, const Summary& summary) {
       {"ATE", readable(errors.ate_rmse), "m", "RMSE of positions, alignment: " + errors.ate_alignment});
   if (errors.kitti_translation_percent)
     report.figure({"KITTI drift", readable(*errors.kitti_translation_percent), "%", "over 100 to 800 m"});
+  if (errors.consistency)
+    report.figure({"NEES of the pose", readable(errors.consistency->nees_mean), "",
+                   "6 where the covariance is right; " + readable(100 * errors.consistency->nees_above_999) +
+                       " % of the frames above 22.5"});
   if (errors.revisit)
     report.figure({"same place again", readable(errors.revisit->position), "m",
                    "largest disagreement of " + std::to_string(errors.revisit->pairs) + " returns"});
@@ -136,6 +143,29 @@ example::LinePlot error_plot(const RunRecord& run, const TimeAxis& time, bool he
       "Distance from the truth, the first poses coinciding; dashed: three standard deviations of "
       "the pose measured in this frame.";
   plot.curves = {{"error", Ink::wrong, error, false}, {"3 sigma", Ink::belief, claimed, true}};
+  return plot;
+}
+
+/// How far the truth is from the estimate in units of what the covariance claims.
+example::LinePlot consistency_plot(const RunRecord& run, const TimeAxis& time) {
+  example::LinePlot plot{.title = "Does it know how wrong it is?",
+                         .caption = {},
+                         .x = time.axis,
+                         .y = {"NEES", ""},
+                         .x_values = time.values,
+                         .curves = {}};
+  const auto nees = over_frames(run, [](const FrameRecord& frame) { return pose_nees(frame).value_or(gap); });
+  if (std::none_of(nees.begin(), nees.end(), [](double e) { return std::isfinite(e); })) {
+    plot.caption = "This data has no truth: whether the covariance is right is not known.";
+    return plot;
+  }
+  plot.caption =
+      "Error of the pose, squared, over its covariance (6 numbers): 6 on average where the covariance is "
+      "right, one frame in a thousand above the dashed line. Neighbouring frames err together.";
+  plot.curves = {
+      {"NEES", Ink::belief, nees, false},
+      {"expected", Ink::truth, std::vector<double>(nees.size(), 6.0), false},
+      {"0.999", Ink::wrong, std::vector<double>(nees.size(), cairn::chi_square_quantile(0.999, 6)), true}};
   return plot;
 }
 
@@ -233,6 +263,7 @@ example::Report run_report(const RunRecord& run, const Summary& summary) {
   report.add(sample_picture(run));
   report.add(error_plot(run, time, false));
   report.add(error_plot(run, time, true));
+  report.add(consistency_plot(run, time));
   report.add(match_plot(run, time));
   report.add(landmark_plot(run, time));
   return report;

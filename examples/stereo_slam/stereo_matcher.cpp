@@ -9,6 +9,7 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/parallel.hpp>
 
+#include "descriptor_distance.hpp"
 #include "patch_alignment.hpp"
 
 namespace stereo_slam {
@@ -37,22 +38,6 @@ struct Best {
       *this = {candidate, candidate_index};
   }
 };
-
-/// Squared Euclidean distance. Four-by-four independent sums let the compiler use vector registers.
-float squared_distance(const float* a, const float* b, int dimension) {
-  constexpr int lanes = 16;
-  float sums[lanes] = {};
-  int i = 0;
-  for (; i + lanes <= dimension; i += lanes)
-    for (int lane = 0; lane < lanes; ++lane) {
-      const float difference = a[i + lane] - b[i + lane];
-      sums[lane] += difference * difference;
-    }
-  float sum = 0;
-  for (; i < dimension; ++i) sum += (a[i] - b[i]) * (a[i] - b[i]);
-  for (const float part : sums) sum += part;
-  return sum;
-}
 
 }  // namespace
 
@@ -113,8 +98,8 @@ std::vector<PointPair> StereoMatcher::operator()(cairn::ImageView left_image, co
         continue;
       const float ratio = candidate->scale / point.scale;
       if (ratio > options_.scale_ratio || ratio * options_.scale_ratio < 1) continue;
-      const float distance = squared_distance(left.descriptor(point.index).data(),
-                                              right.descriptor(candidate->index).data(), left.dimension);
+      const float distance =
+          squared_distance(left.descriptor(point.index), right.descriptor(candidate->index));
       second = std::min(second, std::max(distance, best.distance));
       best.offer(distance, candidate->index);
       backward[candidate->index].offer(distance, point.index);

@@ -3,6 +3,7 @@
 #include "summary.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
 
@@ -10,6 +11,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/statistics.hpp>
+#include <cairn/eval/consistency.hpp>
 #include <cairn/eval/kitti_metric.hpp>
 #include <cairn/eval/trajectory_error.hpp>
 
@@ -38,6 +40,21 @@ double path_length(const RunRecord& run) {
   for (std::size_t i = 1; i < run.frames.size(); ++i)
     length += (position(run.frames[i]) - position(run.frames[i - 1])).norm();
   return length;
+}
+
+std::optional<PoseConsistency> consistency_of(const RunRecord& run) {
+  const double limit = cairn::chi_square_quantile(0.999, 6);
+  PoseConsistency result;
+  for (const FrameRecord& frame : run.frames)
+    if (const auto nees = pose_nees(frame)) {
+      ++result.frames;
+      result.nees_mean += *nees;
+      result.nees_above_999 += *nees > limit ? 1 : 0;
+    }
+  if (result.frames == 0) return std::nullopt;
+  result.nees_mean /= static_cast<double>(result.frames);
+  result.nees_above_999 /= static_cast<double>(result.frames);
+  return result;
 }
 
 TruthErrors errors_against(const std::vector<cairn::PosePair>& pairs) {
@@ -120,6 +137,9 @@ void append_errors(Json& json, const Summary& summary) {
   json["revisit_position_m"] = revisit ? number(revisit->position) : Json(nullptr);
   json["revisit_heading_deg"] = revisit ? number(revisit->heading * degrees) : Json(nullptr);
   json["revisit_pairs"] = revisit ? revisit->pairs : 0;
+  const std::optional<PoseConsistency> consistency = errors ? errors->consistency : std::nullopt;
+  json["pose_nees_mean"] = consistency ? number(consistency->nees_mean) : Json(nullptr);
+  json["pose_nees_above_999"] = consistency ? number(consistency->nees_above_999) : Json(nullptr);
 }
 
 }  // namespace
@@ -134,6 +154,13 @@ std::vector<cairn::PosePair> truth_pairs(const RunRecord& run) {
 FrameError frame_error(const cairn::SE3& estimate, const cairn::SE3& truth) {
   return {(estimate.translation() - truth.translation()).norm(),
           (truth.rotation().inverse() * estimate.rotation()).angle()};
+}
+
+std::optional<double> pose_nees(const FrameRecord& frame) {
+  constexpr double gauge = 1e-10;  // variance
+  if (!frame.truth || !frame.tracked || !(frame.covariance.diagonal().minCoeff() > gauge))
+    return std::nullopt;
+  return cairn::normalised_squared(cairn::local(frame.T_world_camera, *frame.truth), frame.covariance);
 }
 
 std::optional<RevisitError> revisit_error(const std::vector<cairn::PosePair>& pairs,
@@ -166,7 +193,10 @@ Summary summarise(const RunRecord& run) {
   summary.landmarks = run.landmarks.size();
   summary.path = path_length(run);
   const std::vector<cairn::PosePair> pairs = truth_pairs(run);
-  if (!pairs.empty()) summary.errors = errors_against(pairs);
+  summary.keyframes = run.frames.back().keyframes;
+  if (pairs.empty()) return summary;
+  summary.errors = errors_against(pairs);
+  summary.errors->consistency = consistency_of(run);
   return summary;
 }
 
@@ -182,10 +212,22 @@ std::string summary_json(const RunRecord& run, const Summary& summary) {
   json["map_matches"] = number(summary.map_matches);
   json["inliers"] = number(summary.inliers);
   json["landmarks"] = summary.landmarks;
+  json["keyframes"] = summary.keyframes;
   append_errors(json, summary);
   json["features"] = run.features;
   json["store"] = run.store;
   json["seed"] = run.seed;
+  json["variance_factor"] = number(run.variance_factor);
+  Json& calibration = json["calibration"];
+  calibration["on"] = run.calibration.on;
+  calibration["why"] = run.calibration.why;
+  const std::array<const char*, 5> names{"rotation_x", "rotation_y", "rotation_z", "baseline_y",
+                                         "baseline_z"};
+  for (int i = 0; run.calibration.on && i < 5; ++i) {
+    Json& one = calibration[std::string(names[static_cast<std::size_t>(i)]) + "_rad"];
+    one["value"] = number(run.calibration.numbers(i));
+    one["sigma"] = number(run.calibration.sigmas(i));
+  }
   json["target_points"] = run.target_points;
   json["notes"] = run.notes;
   return text_of(json);

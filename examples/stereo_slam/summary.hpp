@@ -51,6 +51,13 @@ struct RevisitOptions {
   double angle = std::numbers::pi / 90;  ///< and true attitudes within [rad], two degrees
 };
 
+/// Does the system know how wrong it is? NEES e^T P^-1 e of the pose, 6 where its covariance is right.
+struct PoseConsistency {
+  double nees_mean = 0;
+  double nees_above_999 = 0;  ///< share of frames above the 0.999 quantile, 22.5: 0.001 where it is right
+  std::size_t frames = 0;     ///< that were tracked, have a truth and are not the gauge
+};
+
 /// Errors against the truth; only where frames have it.
 struct TruthErrors {
   std::size_t frames = 0;                           ///< that have a truth
@@ -62,6 +69,7 @@ struct TruthErrors {
   double end = 0;                                   ///< distance at the last frame with a truth [m]
   FrameError largest;                               ///< largest of each over all frames
   std::optional<RevisitError> revisit;              ///< nothing when no place is visited twice
+  std::optional<PoseConsistency> consistency;       ///< nothing where no frame claims a covariance
 };
 
 struct Summary {
@@ -73,7 +81,8 @@ struct Summary {
   double map_matches = 0;
   double inliers = 0;
   std::size_t landmarks = 0;
-  double path = 0;  ///< [m], of the truth where every frame has one, otherwise of the estimate
+  std::size_t keyframes = 0;  ///< in the map at the end
+  double path = 0;            ///< [m], of the truth where every frame has one, otherwise of the estimate
   std::optional<TruthErrors> errors;
 };
 
@@ -88,6 +97,10 @@ struct Timing {
 
 /// Distance of an estimated pose from the true one.
 [[nodiscard]] FrameError frame_error(const cairn::SE3& estimate, const cairn::SE3& truth);
+
+/// NEES of a frame's pose; nothing without a truth, where it was lost, or where its covariance is none or
+/// that of the gauge (smaller than any camera's: 10 um, 10 urad).
+[[nodiscard]] std::optional<double> pose_nees(const FrameRecord& frame);
 
 /// For every pose the nearest earlier one at the same true place, compared by
 /// E = (P_i^-1 P_j)^-1 (Q_i^-1 Q_j), P estimate, Q truth; nothing when there is none. O(n^2), 0.1 s for 4000.

@@ -35,7 +35,8 @@ std::set<std::string> names_in(const fs::path& folder) {
 }
 
 std::set<std::string> expected_names() {
-  std::set<std::string> names{"map.ply", "summary.json", "timing.json", "trajectory.kitti", "trajectory.tum"};
+  std::set<std::string> names{"map.ply",          "summary.json",   "timing.json",
+                              "trajectory.kitti", "trajectory.tum", "trajectory_covariance.csv"};
   if (example::has_report_page()) names.insert("report.html");
   return names;
 }
@@ -76,6 +77,23 @@ TEST_CASE("outputs: the trajectories read back as they were") {
     CHECK((expected.inverse() * tum[i].T_world_body).log().norm() < 1e-12);
     CHECK((expected.inverse() * kitti[i].T_world_body).log().norm() < 1e-12);
   }
+}
+
+TEST_CASE("outputs: the covariances are there row by row, the upper triangle") {
+  const Folder folder;
+  auto run = cairn_test::straight_run(3);
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) run.frames[1].covariance(i, j) = 0.5 * std::min(i, j) + 10 * std::max(i, j);
+  run.frames[2].tracked = false;
+  stereo_slam::write_covariances(folder / "c.csv", run.frames);
+  const std::string text = cairn::read_file(folder / "c.csv");
+  CHECK(text.starts_with("frame,time,tracked,x_x,x_y,x_z,x_rx,x_ry,x_rz,y_y,"));
+  CHECK(text.find(",rz_rz\n0,0,1,1e-04,0,0,0,0,0,1e-04,") != std::string::npos);
+  CHECK(text.find(
+            "\n1,0.1,1,0,10,20,30,40,50,10.5,20.5,30.5,40.5,50.5,21,31,41,51,31.5,41.5,51.5,42,52,52.5\n") !=
+        std::string::npos);
+  CHECK(text.find("\n2,0.2,0,") != std::string::npos);
+  CHECK(std::count(text.begin(), text.end(), '\n') == 4);
 }
 
 TEST_CASE("outputs: the map reads back with every property of every landmark") {

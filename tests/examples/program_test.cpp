@@ -52,7 +52,8 @@ nlohmann::json summary_in(const fs::path& out) {
 }
 
 std::set<std::string> results() {
-  std::set<std::string> names{"trajectory.tum", "trajectory.kitti", "map.ply", "summary.json", "timing.json"};
+  std::set<std::string> names{"trajectory.tum", "trajectory.kitti", "trajectory_covariance.csv",
+                              "map.ply",        "summary.json",     "timing.json"};
   if (example::has_report_page()) names.insert("report.html");
   return names;
 }

@@ -83,7 +83,7 @@ void check_opens(const stereo_slam::RunRecord& run, const std::string& name, std
   REQUIRE_FALSE(stereo_slam::write_outputs(run, folder.path()));
   const Opened opened = open_page(folder, folder / "report.html");
   CHECK(opened.console == "");
-  CHECK(opened.document.find("data-panels=\"7\"") != std::string::npos);
+  CHECK(opened.document.find("data-panels=\"8\"") != std::string::npos);
   CHECK(count(opened.document, "class=\"uplot") == plots);
   CHECK(count(opened.document, "class=\"cloud\"") == clouds);
   keep_picture(folder, folder / "report.html", name);
@@ -94,7 +94,7 @@ void check_opens(const stereo_slam::RunRecord& run, const std::string& name, std
 TEST_SUITE_BEGIN("examples/report page");
 
 TEST_CASE("report page: a run with truth opens without a word on the console") {
-  if (can_open()) check_opens(cairn_test::circular_run(400, 4000), "circle", 5, 1);
+  if (can_open()) check_opens(cairn_test::circular_run(400, 4000), "circle", 6, 1);
 }
 
 TEST_CASE("report page: a run without truth, landmarks and sample opens as well") {
@@ -107,7 +107,7 @@ TEST_CASE("report page: a run without truth, landmarks and sample opens as well"
 }
 
 TEST_CASE("report page: 4000 frames and 20000 landmarks open") {
-  if (can_open()) check_opens(cairn_test::circular_run(4000, 20000, 10), "large", 5, 1);
+  if (can_open()) check_opens(cairn_test::circular_run(4000, 20000, 10), "large", 6, 1);
 }
 
 TEST_SUITE_END();

@@ -96,6 +96,27 @@ TEST_CASE("summary: the second lap disagrees with the first by what was put in")
   CHECK(json["revisit_heading_deg"].get<double>() == Approx(0.5));
 }
 
+TEST_CASE(
+    "summary: errors of one sigma in each of six numbers are a NEES of six, ten sigma are above 0.999") {
+  auto run = cairn_test::straight_run(40);
+  for (auto& frame : run.frames) {
+    frame.covariance = 4e-6 * cairn::Matrix<6>::Identity();
+    frame.truth = cairn::retract(frame.T_world_camera, cairn::Vector<6>::Constant(0.002));
+  }
+  run.frames[0].covariance = 1e-12 * cairn::Matrix<6>::Identity();  // the world
+  run.frames[7].tracked = false;
+  for (std::size_t i = 30; i < 40; ++i)
+    run.frames[i].truth =
+        cairn::retract(run.frames[i].T_world_camera, cairn::Vector<6>::Constant(0.02 / std::sqrt(6.0)));
+  run.frames.back().keyframes = 12;
+  const auto json = json_of(run);
+  CHECK(json["pose_nees_mean"].get<double>() == Approx((28 * 6 + 10 * 100) / 38.0));
+  CHECK(json["pose_nees_above_999"].get<double>() == Approx(10 / 38.0));
+  CHECK(json["keyframes"] == 12);
+  for (auto& frame : run.frames) frame.truth.reset();
+  CHECK(json_of(run)["pose_nees_mean"].is_null());
+}
+
 TEST_CASE("summary: the same place looked at in another direction is no return") {
   RunRecord run = straight_run(60);
   for (std::size_t i = 0; i < 60; ++i)

@@ -285,7 +285,7 @@ private:
     widening = std::max(1.0, widening / 4);
   }
   const double efficiency =
-      detail::robust_efficiency(RobustLoss::cauchy, options.loss_scale, options.gate_probability, gate, 5);
+      robust_efficiency(RobustLoss::cauchy, options.loss_scale, options.gate_probability, gate, 5);
   const auto posterior = problem.covariance(information, gate, efficiency);
   if (!posterior || !all_finite(problem.state())) return result;
   result.inliers = problem.inside(gate);

@@ -26,6 +26,7 @@
 #include <cairn/geometry/alignment.hpp>
 #include <cairn/geometry/detail/pose_equations.hpp>
 #include <cairn/geometry/ransac.hpp>
+#include <cairn/geometry/robust_loss.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
 

@@ -1,0 +1,647 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The map of a stereo camera whose covariance is true: keyframe poses in one joint Gaussian, landmarks
+/// conditional on the keyframes that saw them.
+///
+/// All landmarks that a frame makes share the error of that frame's pose. A filter for each of them forgets
+/// that, and the next pose then averages one error as if it were a thousand: its covariance is too small by a
+/// factor that grows for ever. Here the poses of keyframes keep all their correlations, and each landmark
+/// keeps the few sightings it follows from. Pixels are independent, so
+///   p(map) = p(poses) prod_i p(x_i | poses of the keyframes that saw i)                   (1)
+/// is exact, and costs 36 N^2 numbers for N keyframes, whatever the number of landmarks.
+///
+/// ```cpp
+/// cairn::KeyframeMap map(rig);
+/// map.begin(cairn::SE3());                                   // where the world is
+/// for (const cairn::StereoSighting& s : first) map.add_landmark(s);
+/// for (const Frame& frame : frames) {
+///   const cairn::MapLocation here = map.locate(guess, frame.matches);  // leaves no trace in the map
+///   if (!here.good() || !frame.shows_much_that_is_new) continue;
+///   if (!map.add_keyframe(here, frame.matches)) continue;
+///   for (const cairn::StereoSighting& s : frame.unmatched) map.add_landmark(s);
+/// }
+/// ```
+///
+/// What a sighting says is used in the covariance of the keyframes once: a keyframe learns from those of its
+/// matches that it records in the landmarks' lists, no others, and the lists are short (a few sightings a
+/// visit, six in all), so that what is seen for long does not pretend to be new. Landmarks and keyframes are
+/// never moved towards the present; at a return it is the covariance that lets the earliest decide.
+///
+/// Frames: poses map the left camera's coordinates to the world's. Errors of keyframes are steps in the world
+/// (world_pose.hpp). Deterministic; one thread.
+///
+/// (H. Strasdat, J. Montiel, A. Davison, "Visual SLAM: why filter?", Image and Vision Computing 30, 2012, for
+/// keyframes; R. Smith, M. Self, P. Cheeseman, 1990, for what joint covariances are for; S. Schmidt 1966.)
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <span>
+#include <string>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include <cairn/core/check.hpp>
+#include <cairn/core/linalg.hpp>
+#include <cairn/core/statistics.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/joint_gaussian.hpp>
+#include <cairn/geometry/rig_correction.hpp>
+#include <cairn/geometry/robust_loss.hpp>
+#include <cairn/geometry/stereo_rig.hpp>
+#include <cairn/geometry/triangulation.hpp>
+#include <cairn/manifold/se3.hpp>
+#include <cairn/slam/detail/frame_work.hpp>
+#include <cairn/slam/detail/keyframe_equations.hpp>
+#include <cairn/slam/detail/keyframe_landmark.hpp>
+#include <cairn/slam/map_location.hpp>
+#include <cairn/slam/world_pose.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn { inline namespace CAIRN_ABI {
+
+struct KeyframeMapOptions {
+  int sightings_a_visit = 3;  ///< recorded of a landmark while it stays in view
+  int sightings = 6;          ///< recorded in all; at most 6
+  int visit_gap = 20;         ///< frames out of view after which it is another visit
+  std::size_t max_keyframes = 300;
+  std::size_t min_matches = 10;    ///< fewer: no pose
+  double gate_probability = 0.99;  ///< share of good matches that pass the chi-square gate
+  RobustLoss loss = RobustLoss::cauchy;
+  double loss_scale = 3;  ///< in standard deviations of the whole residual
+  /// Of each of the five numbers by which the rig may be off (geometry/rig_correction.hpp) [rad]; 0: it is
+  /// known exactly. Otherwise they are part of the joint state and are learned with the keyframes.
+  double rig_sigma = 0;
+  double first_sigma = 1e-6;        ///< of the first keyframe, which is the gauge [m, rad]
+  double contradiction = 1 - 1e-6;  ///< a list less likely than this is that of no landmark; it is forgotten
+  double much_vaguer =
+      9;  ///< a keyframe learns from lists that may grow unless its variance is so much larger
+};
+
+/// The map. Needs a rig with a baseline.
+class KeyframeMap {
+public:
+  explicit KeyframeMap(const StereoRig& rig, const KeyframeMapOptions& options = {})
+      : options_(options),
+        rig_(rig),
+        correction_(rig),
+        gate_(chi_square_quantile(options.gate_probability, 4)),
+        efficiency_(robust_efficiency(options.loss, options.loss_scale, options.gate_probability, gate_, 4)) {
+    CAIRN_EXPECTS(rig.baseline() > 0, "KeyframeMap: the rig needs a baseline");
+    CAIRN_EXPECTS(options.sightings >= 1 && options.sightings <= static_cast<int>(detail::most_sightings) &&
+                      options.sightings_a_visit >= 1,
+                  "KeyframeMap: a list has one to six sightings, and one a visit at least");
+    CAIRN_EXPECTS(options.max_keyframes >= 4, "KeyframeMap: expected room for four keyframes");
+    CAIRN_EXPECTS(options.rig_sigma >= 0 && std::isfinite(options.rig_sigma),
+                  "KeyframeMap: a rig's sigma is not negative");
+    CAIRN_EXPECTS(options.loss_scale > 0 && options.first_sigma > 0 && options.min_matches >= 3,
+                  "KeyframeMap: scales and sigmas are positive, and a pose needs three matches");
+  }
+
+  // What there is.
+
+  [[nodiscard]] bool empty() const noexcept { return keyframes_.empty(); }
+  [[nodiscard]] std::size_t keyframe_count() const noexcept {
+    return static_cast<std::size_t>(poses_.size()) - (poses_.contains(rig_block_) ? 1 : 0);
+  }
+  /// Keyframes added so far, those that left included.
+  [[nodiscard]] std::size_t keyframes_added() const noexcept { return keyframes_.size(); }
+  [[nodiscard]] std::size_t landmark_count() const noexcept { return landmarks_.size(); }
+  [[nodiscard]] bool contains(std::uint32_t landmark) const noexcept { return place_.contains(landmark); }
+  [[nodiscard]] const StereoRig& rig() const noexcept { return rig_; }
+  /// Poses of the keyframes that are there, in the order in which they came.
+  [[nodiscard]] std::vector<SE3> keyframe_poses() const {
+    std::vector<SE3> poses;
+    for (const Keyframe& keyframe : keyframes_)
+      if (poses_.contains(keyframe.block)) poses.push_back(poses_.mean(keyframe.block).T_world_body);
+    return poses;
+  }
+  /// Their joint covariance, steps in the world.
+  [[nodiscard]] Matrix<dynamic, dynamic> covariance() const {
+    std::vector<AnyBlockId> ids;
+    for (const Keyframe& keyframe : keyframes_)
+      if (poses_.contains(keyframe.block)) ids.push_back(keyframe.block);
+    return poses_.covariance(ids);
+  }
+  /// The rig's five numbers, where they are estimated and the map has begun.
+  [[nodiscard]] std::optional<Gaussian<Vector<5>>> rig_correction() const {
+    if (!poses_.contains(rig_block_)) return std::nullopt;
+    return Gaussian<Vector<5>>{poses_.mean(rig_block_), pose_factor_ * poses_.covariance(rig_block_)};
+  }
+
+  /// Position given the keyframes, with the covariance it had if those were known: what a pose is to be
+  /// estimated from. Nothing for a landmark that is not there, or whose sightings contradict each other under
+  /// the keyframes as they now stand (it is then forgotten).
+  [[nodiscard]] std::optional<Gaussian<Vector<3>>> landmark(std::uint32_t id) {
+    detail::KeyframeLandmark* const found = fresh(id);
+    if (found == nullptr) return std::nullopt;
+    return Gaussian<Vector<3>>{found->x, found->S};
+  }
+  /// The same with the keyframes' uncertainty: how well the landmark is known in the world.
+  [[nodiscard]] std::optional<Gaussian<Vector<3>>> landmark_in_world(std::uint32_t id) {
+    const detail::KeyframeLandmark* const found = fresh(id);
+    if (found == nullptr) return std::nullopt;
+    Matrix<3> P = found->S;
+    for (std::size_t a = 0; a < found->count; ++a)
+      for (std::size_t b = 0; b < found->count; ++b) {
+        const Matrix<6> cross = poses_.cross_covariance(block_of(*found, a), block_of(*found, b));
+        Matrix<3, 6> half;  // G cross
+        for (int c = 0; c < 6; ++c) put(half, 0, c, moved_with_world(found->x, &cross(0, c)));
+        const Matrix<6, 3> turned = transposed(half);
+        Matrix<3> both;  // G cross G^T, transposed
+        for (int c = 0; c < 3; ++c) put(both, 0, c, moved_with_world(found->x, &turned(0, c)));
+        P += product_transposed(product(found->F[a], transposed(both)), found->F[b]);
+      }
+    return Gaussian<Vector<3>>{found->x, pose_factor_ * symmetrised(P)};
+  }
+  /// The landmarks that the keyframes of these landmarks saw: what should be in view as well. Ascending.
+  [[nodiscard]] std::vector<std::uint32_t> seen_with(std::span<const std::uint32_t> ids) const {
+    std::vector<std::uint8_t> wanted(keyframes_.size(), 0);
+    for (const std::uint32_t id : ids)
+      if (const auto found = place_.find(id); found != place_.end())
+        for (std::size_t i = 0; i < landmarks_[found->second].count; ++i)
+          wanted[landmarks_[found->second].sightings[i].keyframe] = 1;
+    std::vector<std::uint32_t> result;
+    for (std::size_t k = 0; k < keyframes_.size(); ++k)
+      if (wanted[k] != 0)
+        for (const std::uint32_t id : keyframes_[k].saw)
+          if (contains(id)) result.push_back(id);
+    std::ranges::sort(result);
+    result.erase(std::unique(result.begin(), result.end()), result.end());
+    return result;
+  }
+
+  // What changes it.
+
+  /// The first keyframe, which says where the world is. Only for an empty map.
+  void begin(const SE3& T_world_camera) {
+    CAIRN_EXPECTS(empty(), "KeyframeMap::begin: the map has begun already");
+    if (!all_finite(T_world_camera.matrix())) raise("KeyframeMap::begin: expected a finite pose");
+    const Matrix<6> P = Matrix<6>::Identity() * (options_.first_sigma * options_.first_sigma);
+    const auto added = poses_.add(WorldPose{T_world_camera}, P);
+    CAIRN_ASSERT(added.accepted(), "a finite pose with a diagonal covariance is a belief");
+    if (options_.rig_sigma > 0)
+      rig_block_ = poses_
+                       .add(Vector<5>(Vector<5>::Zero()),
+                            Matrix<5>(Matrix<5>::Identity() * (options_.rig_sigma * options_.rig_sigma)))
+                       .id;
+    enlist(added.id);
+  }
+
+  /// By how much variances are larger than the sigmas say: those of single pixels, which gates count with,
+  /// and those of poses, which are larger still where pixels err together. No estimate moves by it but for
+  /// what passes the gates.
+  void set_variance_factors(double pixels, double poses) {
+    CAIRN_EXPECTS(pixels > 0 && std::isfinite(pixels) && poses > 0 && std::isfinite(poses),
+                  "KeyframeMap: a variance factor is positive");
+    pixel_factor_ = pixels;
+    pose_factor_ = poses;
+  }
+  [[nodiscard]] double pose_factor() const noexcept { return pose_factor_; }
+
+  /// Another calibration, from outside: landmarks will be where their lists say under it. Not where the map
+  /// estimates the rig itself. O(landmarks).
+  void set_rig(const StereoRig& rig) {
+    CAIRN_EXPECTS(options_.rig_sigma == 0, "KeyframeMap::set_rig: this map estimates its rig");
+    CAIRN_EXPECTS(rig.baseline() > 0, "KeyframeMap: the rig needs a baseline");
+    rig_ = rig;
+    correction_ = RigCorrection(rig);
+    std::vector<std::uint32_t> gone;
+    for (detail::KeyframeLandmark& one : landmarks_)
+      for (std::size_t i = 0; i < one.count; ++i) {
+        detail::RecordedSighting& s = one.sightings[i];
+        const auto whitened = detail::WhitenedSighting::of(rig, s.left, s.right, s.sigma);
+        if (whitened)
+          s.whitened = *whitened;
+        else if (gone.empty() || gone.back() != one.id)
+          gone.push_back(one.id);
+      }
+    for (const std::uint32_t id : gone) drop(id);
+    change();
+  }
+
+  /// A landmark that is new to the map, seen from the newest keyframe. False where its pixels make no point,
+  /// or it is there already.
+  bool add_landmark(const StereoSighting& s) {
+    CAIRN_EXPECTS(!empty(), "KeyframeMap::add_landmark: a map begins with begin()");
+    check(s);
+    if (contains(s.landmark)) return false;
+    const Triangulation point = Triangulator(rig_)(s.left, s.right, s.sigma, s.sigma);
+    const auto whitened = detail::WhitenedSighting::of(rig_, s.left, s.right, s.sigma);
+    if (!point.good() || !whitened) return false;
+    const auto newest = static_cast<std::uint32_t>(keyframes_.size() - 1);
+    detail::KeyframeLandmark one;
+    one.id = s.landmark;
+    one.x = pose_of(newest) * point.point;
+    one.sightings[0] = {newest, s.sigma, s.left, s.right, *whitened};
+    one.count = one.of_visit = 1;
+    one.last_seen = frame_;
+    if (!solve(one)) return false;
+    one.epoch = epoch_;
+    ++keyframes_[newest].sightings;
+    keyframes_[newest].saw.push_back(s.landmark);
+    place_[s.landmark] = landmarks_.size();
+    landmarks_.push_back(one);
+    return true;
+  }
+
+  /// Takes a landmark out. What the keyframes learned by it stays. False where there is none.
+  bool forget(std::uint32_t landmark) {
+    const auto found = place_.find(landmark);
+    if (found == place_.end()) return false;
+    const std::size_t place = found->second;
+    for (std::size_t i = 0; i < landmarks_[place].count; ++i)
+      --keyframes_[landmarks_[place].sightings[i].keyframe].sightings;
+    place_.erase(found);
+    if (place + 1 != landmarks_.size()) {
+      landmarks_[place] = landmarks_.back();
+      place_[landmarks_[place].id] = place;
+    }
+    landmarks_.pop_back();
+    return true;
+  }
+
+  /// The landmarks that the map itself took out since this was last asked: contradicted, spent, or without a
+  /// keyframe.
+  [[nodiscard]] std::vector<std::uint32_t> take_dropped() { return std::exchange(dropped_, {}); }
+
+  /// Where the camera is, from matches of which some may be wrong, near `start`, which most of the good ones
+  /// agree with to within their noise. Uses the keyframes' joint covariance as a prior, so that where old and
+  /// drifted landmarks are in view together the old ones decide; changes nothing in the map but when
+  /// landmarks were last seen. O(matches m^2 + (6 s)^3) for m sightings a landmark and s keyframes in play.
+  /// Throws Error for numbers that are not finite.
+  [[nodiscard]] MapLocation locate(const SE3& start, std::span<const StereoSighting> matches) {
+    if (!all_finite(start.matrix())) raise("KeyframeMap::locate: expected a finite pose to start from");
+    ++frame_;
+    MapLocation result;
+    result.T_world_camera = start;
+    result.inliers.assign(matches.size(), 0);
+    result.chi_squared.assign(matches.size(), std::numeric_limits<double>::infinity());
+    Work work;
+    collect(matches, work);
+    constexpr int most_rounds = 5;
+    bool settled = false;
+    for (int round = 0; round < most_rounds && !settled; ++round) {
+      judge(result.T_world_camera, work);
+      if (linearise(work) < options_.min_matches)
+        return refused(std::move(result), MapLocationStatus::too_few_matches);
+      if (!equations_.solve(work.prior, work.solution))
+        return refused(std::move(result), MapLocationStatus::degenerate);
+      const Vector<6> d = work.solution.step.tail<6>();
+      result.T_world_camera = SE3::exp(d) * result.T_world_camera;
+      const Matrix<6> P = work.solution.covariance.bottomRightCorner<6, 6>();
+      const Cholesky<6> factor(P);
+      settled = round > 0 && factor.good() && factor.whiten(d).squaredNorm() < 1e-3;
+      work.has_solution = true;
+      result.covariance = pose_factor_ * seen_from_body(P, result.T_world_camera);
+    }
+    report(work, result);
+    return result;
+  }
+
+  /// Makes the frame of `here` a keyframe. It learns from those agreeing matches whose lists may still grow,
+  /// or, where they do not determine it, from all, and the map loses the landmarks whose lists were full.
+  /// `matches` are those that located it. False where nothing determines it: the map is then as before.
+  bool add_keyframe(const MapLocation& here, std::span<const StereoSighting> matches) {
+    CAIRN_EXPECTS(here.good() && here.inliers.size() == matches.size(),
+                  "KeyframeMap::add_keyframe: the matches are those of a location that is good");
+    std::vector<std::uint8_t> grows(matches.size(), 0), all = here.inliers;
+    for (std::size_t i = 0; i < matches.size(); ++i)
+      if (here.inliers[i] != 0)
+        if (const auto found = place_.find(matches[i].landmark); found != place_.end())
+          grows[i] = may_grow(landmarks_[found->second]) ? 1 : 0;
+    Work work;
+    if (!learn(here, matches, grows, work) && !learn(here, matches, all, work)) return false;
+    if (!commit(here, work)) return false;
+    record(work);
+    make_room();
+    return true;
+  }
+
+private:
+  struct Keyframe {
+    BlockId<WorldPose> block;
+    std::size_t sightings = 0;       // in lists
+    std::vector<std::uint32_t> saw;  // landmarks, some of which may be gone
+    std::optional<detail::RigView> view;
+    std::uint64_t epoch = 0;
+  };
+  using Entry = detail::FrameEntry;
+  using Work = detail::FrameWork;
+
+  static void check(const StereoSighting& s) {
+    if (all_finite(s.left) && all_finite(s.right) && s.sigma > 0 && std::isfinite(s.sigma)) return;
+    raise("KeyframeMap: expected finite pixels and a positive finite sigma, landmark " +
+          std::to_string(s.landmark) + " has others");
+  }
+
+  [[nodiscard]] const SE3& pose_of(std::uint32_t keyframe) const {
+    return poses_.mean(keyframes_[keyframe].block).T_world_body;
+  }
+  [[nodiscard]] BlockId<WorldPose> block_of(const detail::KeyframeLandmark& one, std::size_t i) const {
+    return keyframes_[one.sightings[i].keyframe].block;
+  }
+  void change() { ++epoch_; }
+  void enlist(BlockId<WorldPose> block) {
+    keyframes_.push_back({block, 0, {}, std::nullopt, 0});
+    change();
+  }
+
+  /// The rig where a keyframe stands, made once a change.
+  [[nodiscard]] const detail::RigView& view_of(std::uint32_t keyframe) {
+    Keyframe& k = keyframes_[keyframe];
+    if (!k.view || k.epoch != epoch_) {
+      k.view.emplace(view_from(pose_of(keyframe)));
+      k.epoch = epoch_;
+    }
+    return *k.view;
+  }
+  [[nodiscard]] bool solve(detail::KeyframeLandmark& one) {
+    return one.solve([this](std::uint32_t keyframe) -> const detail::RigView& { return view_of(keyframe); },
+                     options_.rig_sigma > 0);
+  }
+  [[nodiscard]] detail::RigView view_from(const SE3& T_world_camera) const {
+    detail::RigView view(T_world_camera, rig_);
+    if (options_.rig_sigma > 0)
+      view.by_direction = -rig_.baseline() * transposed_product(rig_.T_left_right.rotation().matrix(),
+                                                                correction_.direction_jacobian());
+    return view;
+  }
+
+  /// The landmark where the keyframes now put it, or null.
+  [[nodiscard]] detail::KeyframeLandmark* fresh(std::uint32_t id) {
+    const auto found = place_.find(id);
+    if (found == place_.end()) return nullptr;
+    detail::KeyframeLandmark& one = landmarks_[found->second];
+    if (one.epoch == epoch_) return &one;
+    one.epoch = epoch_;
+    if (solve(one) && one.chi_squared <= pixel_factor_ * contradiction(one.count)) return &one;
+    drop(id);
+    return nullptr;
+  }
+  void drop(std::uint32_t id) {
+    forget(id);
+    dropped_.push_back(id);
+  }
+  [[nodiscard]] double contradiction(std::size_t count) {
+    if (contradiction_.empty())
+      for (std::size_t n = 0; n <= detail::most_sightings; ++n)
+        contradiction_.push_back(
+            chi_square_quantile(options_.contradiction, n == 0 ? 1.0 : 4.0 * static_cast<double>(n) - 3.0));
+    return contradiction_[count];
+  }
+
+  [[nodiscard]] bool may_grow(const detail::KeyframeLandmark& one) const noexcept {
+    return !one.barred && one.count < static_cast<std::size_t>(options_.sightings) &&
+           one.of_visit < static_cast<std::size_t>(options_.sightings_a_visit);
+  }
+
+  /// The matches whose landmarks are there, and the keyframes those rest on, with their prior.
+  void collect(std::span<const StereoSighting> matches, Work& work,
+               std::span<const std::uint8_t> chosen = {}) {
+    work = {};
+    work.matches = matches;
+    for (const StereoSighting& s : matches) {  // first all: a landmark that is dropped moves others
+      check(s);
+      static_cast<void>(fresh(s.landmark));
+    }
+    constexpr auto nowhere = static_cast<std::uint32_t>(-1);
+    std::vector<std::uint32_t> place(keyframes_.size(), nowhere);
+    for (std::size_t i = 0; i < matches.size(); ++i) {
+      if (!chosen.empty() && chosen[i] == 0) continue;
+      const auto found = place_.find(matches[i].landmark);
+      if (found == place_.end()) continue;
+      const auto seen =
+          detail::WhitenedSighting::of(rig_, matches[i].left, matches[i].right, matches[i].sigma);
+      if (!seen) continue;
+      Entry entry;
+      entry.match = i;
+      entry.landmark = found->second;
+      entry.seen = *seen;
+      const detail::KeyframeLandmark& one = landmarks_[found->second];
+      for (std::size_t k = 0; k < one.count; ++k) {
+        std::uint32_t& at = place[one.sightings[k].keyframe];
+        if (at == nowhere) {
+          at = static_cast<std::uint32_t>(work.keyframes.size());
+          work.keyframes.push_back(one.sightings[k].keyframe);
+          work.blocks.push_back(keyframes_[one.sightings[k].keyframe].block);
+        }
+        entry.place[k] = at;
+      }
+      work.entries.push_back(entry);
+    }
+    if (poses_.contains(rig_block_)) work.blocks.push_back(rig_block_);
+    work.prior = poses_.covariance(work.blocks);
+  }
+
+  /// What each match says at a pose, and how likely that is: the first time under the keyframes as they are,
+  /// then under their solution and with what that leaves uncertain.
+  void judge(const SE3& T, Work& work) {
+    const detail::RigView view = view_from(T);
+    const bool with_rig = options_.rig_sigma > 0;
+    for (Entry& entry : work.entries) {
+      const detail::KeyframeLandmark& one = landmarks_[entry.landmark];
+      entry.statistics = {};
+      entry.rig = {};
+      const bool seen = with_rig ? entry.seen.add(view, one.x, entry.statistics, entry.rig)
+                                 : entry.seen.add(view, one.x, entry.statistics);
+      entry.chi_squared =
+          seen ? chi_squared(entry, one, work) / pixel_factor_ : std::numeric_limits<double>::infinity();
+    }
+  }
+
+  [[nodiscard]] double chi_squared(Entry& entry, const detail::KeyframeLandmark& one,
+                                   const Work& work) const {
+    const detail::PointStatistics& s = entry.statistics;
+    entry.at_solution = s;
+    if (!work.has_solution) return detail::WeighedSighting(s, one.S).chi_squared;
+    Vector<3> moved = Vector<3>::Zero();
+    for (std::size_t i = 0; i < one.count; ++i)
+      moved += product(one.F[i], moved_with_world(one.x, work.solution.step.data() + 6 * entry.place[i]));
+    if (options_.rig_sigma > 0) return chi_squared_with_rig(entry, one, work, moved);
+    const Vector<3> Am = product(s.A, moved);
+    entry.at_solution = {s.A, s.b - Am, s.squares - 2 * s.b.dot(moved) + moved.dot(Am)};
+    const Matrix<3> uncertain =
+        detail::displacement_covariance(one, entry.places(one), work.solution.covariance);
+    return detail::WeighedSighting(entry.at_solution, one.S + (pose_factor_ / pixel_factor_) * uncertain)
+        .chi_squared;
+  }
+
+  [[nodiscard]] double chi_squared_with_rig(Entry& entry, const detail::KeyframeLandmark& one,
+                                            const Work& work, Vector<3> moved) const {
+    const detail::PointStatistics& s = entry.statistics;
+    const detail::RigStatistics& rig = entry.rig;
+    const Vector<5> c = work.solution.step.segment<5>(work.solution.step.size() - 11);
+    moved += product(one.B, c);
+    const Vector<3> Am = product(s.A, moved), Ec = product(rig.E, c);
+    const Vector<5> Dc = product(rig.D, c);
+    entry.at_solution = {
+        s.A, s.b - Am - Ec,
+        s.squares - 2 * (s.b.dot(moved) + rig.u.dot(c)) + moved.dot(Am) + 2 * moved.dot(Ec) + c.dot(Dc)};
+    const Matrix<3> uncertain =
+        detail::displacement_covariance(one, entry.places(one), work.solution.covariance);
+    return detail::WeighedSighting(entry.at_solution, one.S + (pose_factor_ / pixel_factor_) * uncertain)
+        .chi_squared;
+  }
+
+  /// The equations of the matches within the gate, weighted so that together they are worth what the loss and
+  /// the gate leave of them. Returns how many those are.
+  std::size_t linearise(Work& work) {
+    const bool with_rig = options_.rig_sigma > 0;
+    equations_.open(work.keyframes.size(), with_rig);
+    double weights = 0;
+    std::size_t agree = 0;
+    for (Entry& entry : work.entries) {
+      entry.weight = 0;
+      if (!(entry.chi_squared < gate_)) continue;
+      const detail::KeyframeLandmark& one = landmarks_[entry.landmark];
+      entry.weight = robust_weight(options_.loss, options_.loss_scale, entry.chi_squared);
+      const detail::WeighedSighting weighed(entry.statistics, one.S);
+      equations_.add(one, entry.places(one), weighed.N, weighed.g, entry.weight);
+      if (with_rig) equations_.add_rig(one, entry.places(one), weighed, entry.rig, entry.weight);
+      weights += entry.weight;
+      ++agree;
+    }
+    if (agree == 0) return 0;
+    const double worth = efficiency_ * static_cast<double>(agree) / weights;
+    equations_.scale(worth);
+    for (Entry& entry : work.entries) entry.weight *= worth;
+    return agree;
+  }
+
+  [[nodiscard]] static MapLocation refused(MapLocation result, MapLocationStatus status) {
+    result.status = status;
+    result.covariance = Matrix<6>::Zero();
+    return result;
+  }
+
+  void report(const Work& work, MapLocation& result) {
+    result.status = MapLocationStatus::good;
+    std::vector<double> sizes, changes;
+    for (const Entry& entry : work.entries) {
+      result.chi_squared[entry.match] = entry.chi_squared * pixel_factor_;
+      if (!(entry.weight > 0)) continue;
+      result.inliers[entry.match] = 1;
+      sizes.push_back(result.chi_squared[entry.match]);
+      detail::KeyframeLandmark& one = landmarks_[entry.landmark];
+      const Vector<3> from = pose_of(one.sightings[one.count - 1].keyframe).translation();
+      changes.push_back((result.T_world_camera.translation() - from).norm() / (one.x - from).norm());
+      if (frame_ - one.last_seen > static_cast<std::uint64_t>(options_.visit_gap)) one.of_visit = 0;
+      one.last_seen = frame_;
+    }
+    result.score_variance = detail::score_variance(work, landmarks_, equations_.camera(), rig_.left);
+    result.inlier_count = sizes.size();
+    result.median_chi_squared = median(std::move(sizes));
+    result.viewpoint_change = median(std::move(changes));
+  }
+
+  /// The joint posterior of a new keyframe and of those in play by the chosen matches; false where these do
+  /// not determine it about as well as all did.
+  bool learn(const MapLocation& here, std::span<const StereoSighting> matches,
+             std::span<const std::uint8_t> chosen, Work& work) {
+    collect(matches, work, chosen);
+    judge(here.T_world_camera, work);
+    for (Entry& entry : work.entries)  // judged by all that located it
+      if (std::isfinite(entry.chi_squared)) entry.chi_squared = here.chi_squared[entry.match] / pixel_factor_;
+    if (linearise(work) < options_.min_matches || !equations_.solve(work.prior, work.solution)) return false;
+    const Matrix<6> P = pose_factor_ * seen_from_body(work.solution.covariance.bottomRightCorner<6, 6>(),
+                                                      here.T_world_camera);
+    for (int i = 0; i < 6; ++i)
+      if (!(P(i, i) <= options_.much_vaguer * here.covariance(i, i))) return false;
+    return true;
+  }
+
+  bool commit(const MapLocation& here, const Work& work) {
+    const Eigen::Index n = work.prior.rows();
+    const Vector<6> own = work.solution.step.tail<6>();
+    const auto added =
+        poses_.commit(work.blocks, Vector<dynamic>(work.solution.step.head(n)), work.solution.covariance,
+                      WorldPose{SE3::exp(own) * here.T_world_camera});
+    if (!added.accepted()) return false;
+    if (poses_.contains(rig_block_)) rig_ = correction_.rig(poses_.mean(rig_block_));
+    enlist(added.id);
+    return true;
+  }
+
+  /// Writes what the newest keyframe learned from into the lists; a landmark whose list is full is spent.
+  void record(const Work& work) {
+    const auto newest = static_cast<std::uint32_t>(keyframes_.size() - 1);
+    std::vector<std::uint32_t> spent;
+    for (const Entry& entry : work.entries) {
+      if (!(entry.weight > 0)) continue;
+      detail::KeyframeLandmark& one = landmarks_[entry.landmark];
+      if (one.barred || one.count == static_cast<std::size_t>(options_.sightings)) {
+        spent.push_back(one.id);
+        continue;
+      }
+      const StereoSighting& s = work.matches[entry.match];
+      const double sigma = s.sigma / std::sqrt(entry.weight);
+      const auto whitened = detail::WhitenedSighting::of(rig_, s.left, s.right, sigma);
+      one.sightings[one.count++] = {newest, sigma, s.left, s.right, *whitened};
+      ++one.of_visit;
+      ++keyframes_[newest].sightings;
+      keyframes_[newest].saw.push_back(one.id);
+    }
+    for (const std::uint32_t id : spent) drop(id);
+  }
+
+  /// Keyframes without a landmark leave, and over the cap the one of the newer half that fewest rest on.
+  void make_room() {
+    std::vector<std::uint32_t> there;
+    for (std::uint32_t k = 0; k + 1 < keyframes_.size(); ++k) {
+      if (!poses_.contains(keyframes_[k].block)) continue;
+      if (keyframes_[k].sightings == 0)
+        static_cast<void>(poses_.marginalise(keyframes_[k].block));
+      else
+        there.push_back(k);
+    }
+    if (there.size() < options_.max_keyframes) return;
+    const auto newer = there.begin() + static_cast<std::ptrdiff_t>(there.size() / 2);
+    strike(*std::min_element(newer, there.end() - 1, [&](std::uint32_t a, std::uint32_t b) {
+      return keyframes_[a].sightings < keyframes_[b].sightings;
+    }));
+  }
+
+  /// A keyframe leaves, and its entries in all lists. What it learned lives on in P while these landmarks
+  /// forget it: they may not teach another keyframe the same again.
+  void strike(std::uint32_t keyframe) {
+    std::vector<std::uint32_t> empty;
+    for (detail::KeyframeLandmark& one : landmarks_)
+      for (std::size_t i = 0; i < one.count; ++i) {
+        if (one.sightings[i].keyframe != keyframe) continue;
+        one.strike(i);
+        one.barred = true;
+        if (one.count == 0) empty.push_back(one.id);
+        break;
+      }
+    keyframes_[keyframe].sightings = 0;
+    keyframes_[keyframe].saw = {};
+    for (const std::uint32_t id : empty) drop(id);
+    static_cast<void>(poses_.marginalise(keyframes_[keyframe].block));
+    change();
+  }
+
+  KeyframeMapOptions options_;
+  StereoRig rig_;  // as it is believed to be
+  RigCorrection correction_;
+  double gate_, efficiency_;
+  JointGaussian<WorldPose, Vector<5>> poses_;
+  BlockId<Vector<5>> rig_block_;     // where the rig is estimated
+  std::vector<Keyframe> keyframes_;  // all that ever were
+  std::vector<detail::KeyframeLandmark> landmarks_;
+  std::unordered_map<std::uint32_t, std::size_t> place_;
+  std::vector<std::uint32_t> dropped_;
+  std::vector<double> contradiction_;
+  detail::KeyframeEquations equations_;
+  double pixel_factor_ = 1, pose_factor_ = 1;
+  std::uint64_t epoch_ = 1, frame_ = 0;
+};
+
+}}  // namespace cairn::CAIRN_ABI
