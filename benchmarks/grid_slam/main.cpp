@@ -1,0 +1,146 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+// The scoreboard of grid mapping: scripts/scoreboard grid_slam. Five seeds of three published logs, one
+// setting for all: about twenty minutes. The rivals' figures were measured on the same logs by the same
+// metric, with the scans between processed ones filled along odometry.
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <iostream>
+#include <numbers>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <cairn/eval/relations.hpp>
+#include <cairn/io/carmen.hpp>
+
+#include "floor_plan.hpp"
+#include "run.hpp"
+#include "support/data.hpp"
+#include "support/scoreboard.hpp"
+
+namespace {
+
+using namespace cairn_bench;
+using grid_slam::Results;
+
+constexpr std::uint64_t seeds = 5;
+constexpr double degrees = 180 / std::numbers::pi;
+
+struct Figures {
+  std::string log, title;
+  double must, must_angle, aim;
+  std::optional<double> aim_angle;
+  std::optional<double> rival;
+  std::string rival_name;
+};
+
+/// The log unpacked by bzip2 into a file of this process, or nothing.
+std::optional<cairn::CarmenLog> unpacked(const std::filesystem::path& packed) {
+  const auto file =
+      std::filesystem::temp_directory_path() / ("cairn-scoreboard-" + std::to_string(::getpid()) + ".log");
+  const std::string command = "bzip2 -dc \"" + packed.string() + "\" >\"" + file.string() + "\"";
+  const bool done = std::system(command.c_str()) == 0;  // NOLINT(cert-env33-c): our own command
+  std::optional<cairn::CarmenLog> log;
+  if (done) log = cairn::read_carmen(file);
+  std::filesystem::remove(file);
+  return log;
+}
+
+/// What five runs of a log gave, each list in the order of the seeds.
+struct Runs {
+  std::vector<double> mean, angle, largest, milliseconds, megabytes;
+};
+
+Runs runs_of(const cairn::CarmenLog& log, const std::vector<cairn::PoseRelation>& relations) {
+  Runs runs;
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    const Results r = grid_slam::run(
+        log, {.seed = seed, .threads = std::max(1U, std::thread::hardware_concurrency())}, relations);
+    runs.mean.push_back(r.of_means->mean);
+    runs.angle.push_back(r.of_means->mean_angle * degrees);
+    runs.largest.push_back(r.of_means->largest);
+    runs.milliseconds.push_back(1e3 * r.cpu_seconds / static_cast<double>(r.steps.size()));
+    rusage usage{};
+    ::getrusage(RUSAGE_SELF, &usage);
+    runs.megabytes.push_back(static_cast<double>(usage.ru_maxrss) / 1024);
+    std::cerr << "seed " << seed << ": " << runs.mean.back() << " m, rematched " << r.of_rematched->mean
+              << " m, largest " << runs.largest.back() << " m\n";
+  }
+  return runs;
+}
+
+double median(std::vector<double> values) {
+  std::ranges::sort(values);
+  return values[values.size() / 2];
+}
+double worst(const std::vector<double>& values) {
+  return *std::ranges::max_element(values);
+}
+
+void add_rows(Scoreboard& board, const Figures& f, const std::optional<std::filesystem::path>& folder) {
+  std::optional<Runs> runs;
+  if (folder)
+    if (const auto log = unpacked(*folder / (f.log + ".clf.bz2")))
+      runs = runs_of(*log, cairn::read_relations(*folder / (f.log + ".relations")));
+  const auto row = [&](const std::string& name, const char* unit, std::optional<double> must,
+                       std::optional<double> aim, const auto& value) {
+    Row r{.name = f.title + ": " + name, .unit = unit, .must = must, .aim = aim, .rival_name = "no rival"};
+    if (runs)
+      r.measured = value(*runs);
+    else
+      r.note = "no data";
+    return r;
+  };
+  Row mean = row("mean of relations, median of 5 seeds", "m", f.must, f.aim,
+                 [](const Runs& r) { return median(r.mean); });
+  mean.rival = f.rival;
+  mean.rival_name = f.rival_name;
+  board.add(mean);
+  board.add(row("the same, worst seed", "m", f.log == "aces" ? std::optional(0.055) : std::nullopt, {},
+                [](const Runs& r) { return worst(r.mean); }));
+  board.add(row("mean angle, median", "deg", f.must_angle, f.aim_angle,
+                [](const Runs& r) { return median(r.angle); }));
+  board.add(row("largest relation, worst seed", "m", f.log == "intel" ? std::nullopt : std::optional(0.5), {},
+                [](const Runs& r) { return worst(r.largest); }));
+  if (f.log != "aces") return;
+  board.add(row("CPU a processed scan, 30 particles", "ms", 13, 4,
+                [](const Runs& r) { return median(r.milliseconds); }));
+  board.add(
+      row("resident memory, 30 particles", "MB", 85, 35, [](const Runs& r) { return r.megabytes.front(); }));
+}
+
+void add_rendered_row(Scoreboard& board) {
+  const grid_slam::Drive drive = grid_slam::simulated_drive({});
+  const Results r = grid_slam::run(drive.log, {}, grid_slam::true_relations(drive));
+  board.add({.name = "rendered floor: mean of relations, seed 1",
+             .measured = r.of_means->mean,
+             .unit = "m",
+             .rival = r.of_odometry->mean,
+             .rival_name = "odometry",
+             .note = "largest " + std::to_string(r.of_means->largest) + " m"});
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (const auto code = answer(argc, argv, "scoreboard_grid_slam")) return *code;
+  Scoreboard board("grid_slam");
+  const auto folder = cairn_test::real_data("laser_2d");
+  const std::string others = "open_karto; GMapping 0.0456 to 0.091 by seed";
+  add_rows(board, {"aces", "ACES", 0.045, 0.65, 0.040, 0.60, 0.0449, others}, folder);
+  add_rows(board, {"intel", "Intel", 0.023, 0.80, 0.018, 0.53, 0.0184, "open_karto; GMapping 0.0239"},
+           folder);
+  add_rows(board, {"fr079", "FR079", 0.055, 0.95, 0.048, {}, 0.0554, "GMapping tuned to it"}, folder);
+  add_rendered_row(board);
+  return board.finish();
+}

@@ -1,0 +1,123 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "loop_closing.hpp"
+
+#include <algorithm>
+
+#include <cairn/core/check.hpp>
+#include <cairn/core/cholesky.hpp>
+
+namespace grid_slam {
+
+namespace {
+
+using cairn::Matrix;
+using cairn::SE2;
+using cairn::Vector;
+
+/// The chain at a linearisation point, seen from its start: with Ad_k the adjoint of pose k + 1 there, the
+/// adjoint that carries step k to the right of pose `last` is Ad(pose_last)^-1 Ad_k, so that sums over the
+/// steps of a loop are differences of sums from the start on.
+class Linearised {
+public:
+  Linearised(const StepChain& chain, const StepChain& moved) {
+    SE2 pose;
+    adjoints_.push_back(pose.adjoint());
+    covariance_.push_back(Matrix<3>::Zero());
+    moved_.push_back(Vector<3>::Zero());
+    for (std::size_t k = 0; k < chain.steps.size(); ++k) {
+      pose = pose * moved.steps[k];
+      adjoints_.push_back(pose.adjoint());
+      const Matrix<3>& a = adjoints_.back();
+      covariance_.push_back(covariance_.back() + a * chain.covariances[k] * a.transpose());
+      moved_.push_back(moved_.back() + a * cairn::local(chain.steps[k], moved.steps[k]));
+      inverses_.push_back(pose.inverse().adjoint());
+    }
+  }
+
+  /// Of steps on the right of pose k + 1, seen from the start.
+  [[nodiscard]] const Matrix<3>& adjoint(std::size_t k) const { return adjoints_[k + 1]; }
+  [[nodiscard]] const Matrix<3>& to(std::size_t last) const { return inverses_[last - 1]; }
+
+  /// What the steps that both loops go over contribute to the covariance between their ends.
+  [[nodiscard]] Matrix<3> shared(const Loop& a, const Loop& b) const {
+    const std::size_t first = std::max(a.first, b.first), last = std::min(a.last, b.last);
+    if (first >= last) return Matrix<3>::Zero();
+    return to(a.last) * (covariance_[last] - covariance_[first]) * to(b.last).transpose();
+  }
+  /// How far the steps have moved the loop's end already.
+  [[nodiscard]] Vector<3> moved(const Loop& loop) const {
+    return to(loop.last) * (moved_[loop.last] - moved_[loop.first]);
+  }
+
+private:
+  std::vector<Matrix<3>> adjoints_, covariance_, inverses_;
+  std::vector<Vector<3>> moved_;
+};
+
+/// Moves every step by what the loops over it ask: covariance times the sum of Ad_k^T Ad(last)^-T multiplier.
+void pull(StepChain& moved, const StepChain& chain, const std::vector<Loop>& loops, const Linearised& at,
+          const Eigen::VectorXd& multiplier) {
+  std::vector<Vector<3>> change(chain.steps.size() + 1, Vector<3>::Zero());
+  for (std::size_t i = 0; i < loops.size(); ++i) {
+    const Vector<3> force =
+        at.to(loops[i].last).transpose() * multiplier.segment<3>(static_cast<Eigen::Index>(3 * i));
+    change[loops[i].first] += force;
+    change[loops[i].last] -= force;
+  }
+  Vector<3> force = Vector<3>::Zero();
+  for (std::size_t k = 0; k < chain.steps.size(); ++k) {
+    force += change[k];
+    moved.steps[k] =
+        cairn::retract(chain.steps[k], Vector<3>(chain.covariances[k] * (at.adjoint(k).transpose() * force)));
+  }
+}
+
+}  // namespace
+
+std::vector<SE2> poses_of(const StepChain& chain) {
+  std::vector<SE2> poses{chain.start};
+  poses.reserve(chain.steps.size() + 1);
+  for (const SE2& step : chain.steps) poses.push_back(poses.back() * step);
+  return poses;
+}
+
+Matrix<3> covariance_between(const StepChain& chain, std::size_t first, std::size_t last) {
+  CAIRN_EXPECTS(first < last && last <= chain.steps.size(), "covariance_between needs two poses in order");
+  const Loop loop{first, last, SE2(), Matrix<3>::Zero()};
+  return Linearised(chain, chain).shared(loop, loop);
+}
+
+std::vector<SE2> conditioned(const StepChain& chain, const std::vector<Loop>& loops,
+                             const std::vector<Vector<3>>& noise) {
+  CAIRN_EXPECTS(loops.size() == noise.size(), "conditioned needs a noise for every loop");
+  StepChain moved = chain;
+  const auto rows = static_cast<Eigen::Index>(3 * loops.size());
+  for (int round = 0; round < 3 && !loops.empty(); ++round) {
+    const std::vector<SE2> poses = poses_of(moved);
+    const Linearised at(chain, moved);
+    Eigen::VectorXd error(rows);
+    Eigen::MatrixXd matrix(rows, rows);
+    for (std::size_t i = 0; i < loops.size(); ++i) {
+      const Loop& loop = loops[i];
+      CAIRN_EXPECTS(loop.first < loop.last && loop.last < poses.size(),
+                    "a loop needs two poses of the path, in order");
+      const auto row = static_cast<Eigen::Index>(3 * i);
+      const SE2 seen = poses[loop.first].inverse() * poses[loop.last];
+      error.segment<3>(row) = cairn::local(seen, loop.T_first_last) + noise[i] + at.moved(loop);
+      for (std::size_t j = 0; j <= i; ++j) {
+        const Matrix<3> block = at.shared(loop, loops[j]);
+        const auto column = static_cast<Eigen::Index>(3 * j);
+        matrix.block<3, 3>(row, column) = block;
+        matrix.block<3, 3>(column, row) = block.transpose();
+      }
+      matrix.block<3, 3>(row, row) += loop.covariance;
+    }
+    const cairn::Cholesky<cairn::dynamic> root(matrix);
+    if (!root.good()) return poses_of(chain);
+    pull(moved, chain, loops, at, root.solve(error));
+  }
+  return poses_of(moved);
+}
+
+}  // namespace grid_slam

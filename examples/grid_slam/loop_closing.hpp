@@ -1,0 +1,51 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// A path of drawn steps, conditioned on relative poses that were measured between its ends: loops.
+///
+/// The steps d_k of a path are independent with covariance S_k; a loop measures the product of the steps from
+/// `first` to `last`, with covariance R. Linearised, the loop's error e is A d with A_k the adjoint that
+/// carries step k to the loop's end, and the path is moved by S A^T (A S A^T + R)^-1 (e + v), v ~ N(0, R),
+/// all loops at once: Matheron's rule, which turns a draw from the prior into a draw from the posterior. So
+/// every particle stays a sample, and none needs a weight for it. (A. Journel, C. Huijbregts, "Mining
+/// Geostatistics", 1978, p. 495; J. Wilson et al., "Pathwise conditioning of Gaussian processes", JMLR 22,
+/// 2021, eq. 8.)
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/manifold/se2.hpp>
+
+namespace grid_slam {
+
+/// Pose `last` of the path was seen at T_first_last from pose `first`, first < last.
+struct Loop {
+  std::size_t first = 0;
+  std::size_t last = 0;
+  cairn::SE2 T_first_last;
+  cairn::Matrix<3> covariance = cairn::Matrix<3>::Zero();  ///< of steps on the right of T_first_last
+};
+
+/// A path as its steps: pose k + 1 is pose k times step k.
+struct StepChain {
+  cairn::SE2 start;
+  std::vector<cairn::SE2> steps;
+  std::vector<cairn::Matrix<3>> covariances;  ///< of each step, on its right
+};
+
+/// Poses of the chain, one more than steps.
+[[nodiscard]] std::vector<cairn::SE2> poses_of(const StepChain& chain);
+
+/// Covariance of pose `last` seen from pose `first`, by the steps between them, on the right of `last`.
+[[nodiscard]] cairn::Matrix<3> covariance_between(const StepChain& chain, std::size_t first,
+                                                  std::size_t last);
+
+/// The chain given the loops, each with its noise v (zeros for the most likely path). Three rounds of
+/// Gauss-Newton. The chain as it is where the loops' matrix is not positive definite.
+[[nodiscard]] std::vector<cairn::SE2> conditioned(const StepChain& chain, const std::vector<Loop>& loops,
+                                                  const std::vector<cairn::Vector<3>>& noise);
+
+}  // namespace grid_slam

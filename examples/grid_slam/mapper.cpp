@@ -1,0 +1,348 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "mapper.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include <cairn/core/check.hpp>
+#include <cairn/core/cholesky.hpp>
+#include <cairn/core/parallel.hpp>
+#include <cairn/core/random.hpp>
+#include <cairn/scan/correlative.hpp>
+#include <cairn/scan/match.hpp>
+
+namespace grid_slam {
+
+namespace {
+
+using cairn::Matrix;
+using cairn::ScanPoint;
+using cairn::SE2;
+using cairn::Vector;
+
+std::vector<SE2> poses_on(const std::vector<cairn::PathPose<SE2>>& path) {
+  std::vector<SE2> poses;
+  poses.reserve(path.size());
+  for (const auto& each : path) poses.push_back(each.pose);
+  return poses;
+}
+
+StepChain chain_of(const std::vector<cairn::PathPose<SE2>>& path) {
+  // A match that is surer than this is a match to what was seen a moment ago.
+  const Matrix<3> least = Vector<3>(9e-6, 9e-6, 1e-6).asDiagonal();
+  StepChain chain{path.front().pose, {}, {}};
+  for (std::size_t k = 1; k < path.size(); ++k) {
+    chain.steps.push_back(path[k].before.inverse() * path[k].drawn);
+    chain.covariances.push_back(path[k].drawn_from.covariance + least);
+  }
+  return chain;
+}
+
+/// Points of several scans, seen from the last pose.
+std::vector<ScanPoint> seen_together(const std::vector<SE2>& poses,
+                                     const std::vector<std::vector<ScanPoint>>& points, std::size_t first,
+                                     std::size_t last) {
+  std::vector<ScanPoint> all;
+  for (std::size_t k = first; k <= last; ++k) {
+    const SE2 T = poses[last].inverse() * poses[k];
+    for (const ScanPoint& p : cairn::thinned(points[k - 1], 0.1)) {
+      const Vector<2> q = T * Vector<2>(p.x, p.y);
+      all.push_back({q(0), q(1)});
+    }
+  }
+  return all;
+}
+
+/// What a point is worth by its distance from the obstacles of a map, around a place.
+cairn::ScoreGrid scores_around(const cairn::OccupancyGrid& grid, double x, double y, double reach) {
+  const cairn::GridGeometry& geometry = grid.geometry();
+  const cairn::CellAddress low = geometry.cell_of(x - reach, y - reach);
+  const int side = static_cast<int>(2 * reach / geometry.cell_size) + 1;
+  cairn::ScoreGrid scores(geometry, low, side, side);
+  constexpr double sigma = 0.1;  // [m], about the lattice's own coarseness
+  for (int row = 0; row < side; ++row)
+    for (int column = 0; column < side; ++column) {
+      const auto& o = grid.field().read({low.column + column, low.row + row});
+      if (!o.found()) continue;
+      const double unit = geometry.cell_size / cairn::NearestObstacle::steps;
+      const double squared = unit * unit * (o.dx * o.dx + o.dy * o.dy);
+      scores(column, row) = static_cast<std::uint8_t>(255 * std::exp(-0.5 * squared / (sigma * sigma)));
+    }
+  return scores;
+}
+
+}  // namespace
+
+Mapper::Mapper(const MapperOptions& options) : options_(options) {
+  if (options.particles == 0) cairn::raise("Mapper: expected at least one particle");
+  if (!options.model.valid()) cairn::raise("Mapper: expected a scan model within its ranges");
+  static_cast<void>(empty_map());
+}
+
+OccupancyMap Mapper::empty_map() const {
+  return {cairn::OccupancyGrid({{options_.cell_size, 0, 0}, options_.field_radius}), options_.model};
+}
+
+const Mapper::Belief& Mapper::belief() const {
+  CAIRN_EXPECTS(belief_.has_value(), "belief() needs a mapper that has taken a scan");
+  return *belief_;
+}
+
+bool Mapper::add(const cairn::StampedScan& scan) {
+  bool due = scans_.empty();
+  if (due) {
+    belief_.emplace(scan.T_odom_laser, empty_map(), options_.particles);
+    travelled_.push_back(0);
+  } else {
+    const SE2 moved = scans_.back().T_odom_laser.inverse() * scan.T_odom_laser;
+    accumulate(moved);
+    // Where the robot stops the direction may change, so no step goes on beyond that.
+    const bool stands = moved.translation().norm() < options_.standstill;
+    due = motion_.distance >= options_.step_distance || motion_.angle >= options_.step_angle ||
+          (stands && motion_.distance > 2 * options_.standstill);
+    if (!due && stands) motion_.stood = true;
+  }
+  scans_.push_back(scan);
+  if (due) process(scan);
+  return due;
+}
+
+void Mapper::accumulate(const SE2& moved) {
+  const Vector<3> step = moved.log();
+  motion_.forwards = motion_.forwards * moved;
+  motion_.backwards = motion_.backwards * SE2::exp(Vector<3>(-step(0), -step(1), step(2)));
+  motion_.distance += moved.translation().norm();
+  motion_.angle += std::abs(step(2));
+}
+
+Matrix<3> Mapper::motion_noise() const {
+  if (steps_.empty()) return Vector<3>(1e-6, 1e-6, 1e-6).asDiagonal();
+  const OdometryNoise& n = options_.odometry;
+  const double d = motion_.distance, a = motion_.angle;
+  const double along = n.offset + n.per_metre * d + n.per_radian * a;
+  const double turn = n.angle_offset + n.angle_per_metre * d + n.angle_per_radian * a;
+  return Vector<3>(along * along, along * along, turn * turn).asDiagonal();
+}
+
+void Mapper::process(const cairn::StampedScan& scan) {
+  const std::size_t index = scans_.size() - 1;
+  const Matrix<3> noise = motion_noise();
+  const bool stopped =
+      index > 0 && (scans_[index - 1].T_odom_laser.inverse() * scan.T_odom_laser).translation().norm() <
+                       options_.standstill;
+  const bool may_turn_back = motion_.stood && motion_.distance > 2 * options_.standstill;
+  const double far = options_.slip_distance, round = options_.slip_angle;
+  const Matrix<3> slipped = noise + Matrix<3>(Vector<3>(far * far, far * far, round * round).asDiagonal());
+  const auto motion = [&](const SE2& x, std::size_t regime) {
+    cairn::RegimeMotion<SE2> result;
+    if (steps_.empty()) return cairn::RegimeMotion<SE2>{{{regime, 1, {x, noise}}}};
+    const auto mode = [&](std::size_t way, double share) {
+      result.modes.push_back({way, share, {x * (way == 0 ? motion_.forwards : motion_.backwards), noise}});
+    };
+    const double turn = may_turn_back ? options_.turn_back : options_.turn_unseen;
+    mode(regime, 1 - turn - options_.slip);
+    mode(1 - regime, turn);
+    mode(regime, options_.slip);
+    result.modes.back().motion.covariance = slipped;
+    return result;
+  };
+  FromMatch proposal;
+  proposal.widened = options_.widened;
+  const cairn::ConditionalFilter filter{.resample_below = options_.resample_below,
+                                        .evidence_share = options_.evidence_share,
+                                        .seed = options_.seed,
+                                        .threads = options_.threads};
+  points_.push_back(cairn::scan_points(scan.scan));
+  const cairn::MappingStep step = filter.step(*belief_, motion, proposal, points_.back());
+  if (!step.accepted())
+    cairn::raise("grid_slam: scan " + std::to_string(index) + ": " + cairn::explain(step.status));
+  travelled_.push_back(travelled_.back() + motion_.distance);
+  steps_.push_back({index, step.effective_size, step.resampled, false, belief_->pose()});
+  const bool still_open = motion_.stood && !may_turn_back;  // it has only turned since it stood
+  motion_ = Motion{};
+  motion_.stood = stopped || still_open;
+  if (options_.loops.on) look_for_loop();
+}
+
+void Mapper::look_for_loop() {
+  const LoopOptions& options = options_.loops;
+  if (travelled_.back() - looked_ < options.check_every) return;
+  looked_ = travelled_.back();
+  const auto path = belief_->path(belief_->best());
+  const std::vector<SE2> poses = poses_on(path);
+  const StepChain chain = chain_of(path);
+  for (const std::size_t first : old_places(poses, chain)) {
+    const Matrix<3> covariance = covariance_between(chain, first, poses.size() - 1);
+    const std::optional<Loop> loop = measured_loop(poses, first, covariance);
+    if (!loop) continue;
+    const SE2 seen = poses[loop->first].inverse() * poses[loop->last];
+    const Vector<3> error = cairn::local(seen, loop->T_first_last);
+    const cairn::Cholesky<3> root(Matrix<3>(covariance + loop->covariance));
+    if (!root.good() || root.whiten(error).squaredNorm() > options.gate) continue;
+    take_loop(*loop, error);
+    return;
+  }
+}
+
+void Mapper::take_loop(const Loop& loop, const Vector<3>& error) {
+  const LoopOptions& options = options_.loops;
+  const bool far = error.head<2>().norm() > options.moved || std::abs(error(2)) > options.turned;
+  if (far) {
+    // One look may be deceived by places that look alike; two that ask for the same are believed.
+    const bool again = asked_ && travelled_.back() - asked_at_ < 2.5 * options.check_every &&
+                       (error - *asked_).head<2>().norm() < 0.1 + 0.2 * error.head<2>().norm() &&
+                       std::abs(error(2) - (*asked_)(2)) < 0.03;
+    asked_ = error;
+    asked_at_ = travelled_.back();
+    if (!again) return;
+    asked_.reset();
+  } else if (!loops_.empty() && travelled_.back() - travelled_[loops_.back().last] < options.spacing) {
+    return;
+  }
+  loops_.push_back(loop);
+  if (far) move_paths();
+}
+
+std::vector<std::size_t> Mapper::old_places(const std::vector<SE2>& poses, const StepChain& chain) const {
+  const LoopOptions& options = options_.loops;
+  struct Place {
+    std::size_t pose;
+    double distance;
+  };
+  std::vector<Place> places;  // the nearest pose of each visit
+  double left = -options.apart;
+  for (std::size_t k = 1; k < poses.size() && travelled_.back() - travelled_[k] >= options.apart; ++k) {
+    const double distance = (poses[k].translation() - poses.back().translation()).norm();
+    if (distance > options.reach) continue;
+    if (places.empty() || travelled_[k] - left > 0.5 * options.apart)
+      places.push_back({k, distance});
+    else if (distance < places.back().distance)
+      places.back() = {k, distance};
+    left = travelled_[k];
+  }
+  std::vector<std::size_t> near;
+  for (const Place& place : places) {
+    const Matrix<3> covariance = covariance_between(chain, place.pose, poses.size() - 1);
+    if (place.distance < 2 + 3 * std::sqrt(covariance(0, 0) + covariance(1, 1))) near.push_back(place.pose);
+    if (near.size() == options.places) break;  // the oldest: they tell most
+  }
+  return near;
+}
+
+std::optional<Loop> Mapper::measured_loop(const std::vector<SE2>& poses, std::size_t first,
+                                          const Matrix<3>& covariance) const {
+  const LoopOptions& options = options_.loops;
+  const auto by_path = [&](double at) {
+    return static_cast<std::size_t>(std::ranges::lower_bound(travelled_, at) - travelled_.begin());
+  };
+  const std::size_t begin = std::max<std::size_t>(1, by_path(travelled_[first] - options.submap));
+  const std::size_t end = std::min(by_path(travelled_[first] + options.submap), poses.size());
+  cairn::OccupancyGrid grid = empty_map().grid;
+  grid.insert_all(
+      end - begin, [&](std::size_t i) { return poses[begin + i]; },
+      [&](std::size_t i) -> const std::vector<ScanPoint>& { return points_[begin + i - 1]; });
+  const std::size_t last = poses.size() - 1;
+  const std::size_t since = std::max<std::size_t>(1, by_path(travelled_[last] - options.query));
+  const std::vector<ScanPoint> query = cairn::thinned(seen_together(poses, points_, since, last), 0.05);
+  const double sigma_x = std::sqrt(covariance(0, 0) + covariance(1, 1));
+  const double sigma_angle = std::sqrt(covariance(2, 2));
+  const double reach = std::clamp(3 * sigma_x, 0.3, options.reach),
+               turn = std::clamp(3 * sigma_angle, 0.05, 0.35);
+  const SE2 now = poses[last];
+  const cairn::CorrelativeSearch search(scores_around(grid, now.x(), now.y(), 12 + options.reach), 6);
+  std::vector<ScanPoint> near;
+  for (const ScanPoint& p : query)
+    if (std::hypot(p.x, p.y) < 12) near.push_back(p);
+  const std::vector<ScanPoint> coarse = cairn::thinned(near, 0.25);
+  const auto found = search.find(coarse, now, {reach, reach, turn}, options.enough_score);
+  if (!found) return std::nullopt;
+  const cairn::MatchOptions fine{.model = options_.model};
+  const auto result = cairn::match(grid, near, found->pose, found->pose, Matrix<3>::Zero(), fine);
+  const cairn::Cholesky<3> information(result.information);
+  if (result.matched < options.enough_inliers || !information.good()) return std::nullopt;
+  const Matrix<3> floor = Vector<3>(1e-4, 1e-4, 1e-5).asDiagonal();
+  return Loop{first, last, poses[first].inverse() * result.pose, information.inverse() + floor};
+}
+
+void Mapper::move_paths() {
+  Belief& belief = *belief_;
+  cairn::Random random(options_.seed, ~steps_.size());
+  const std::vector<std::size_t> first = belief.concentrate(options_.loops.survivors, random);
+  std::vector<std::size_t> distinct;
+  for (std::size_t i = 0; i < first.size(); ++i)
+    if (first[i] == i) distinct.push_back(i);
+  std::vector<std::vector<cairn::PathPose<SE2>>> paths(distinct.size());
+  std::vector<OccupancyMap> maps(distinct.size(), empty_map());
+  cairn::parallel_for(distinct.size(), options_.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      paths[i] = moved_path(distinct[i]);
+      maps[i].grid.insert_all(
+          points_.size(), [&](std::size_t k) { return paths[i][k + 1].pose; },
+          [&](std::size_t k) -> const std::vector<ScanPoint>& { return points_[k]; });
+    }
+  });
+  for (std::size_t i = 0; i < distinct.size(); ++i)
+    belief.move(distinct[i], std::move(paths[i]), std::move(maps[i]));
+  for (std::size_t i = 0; i < first.size(); ++i)
+    if (first[i] != i) belief.copy_path(first[i], i);
+  steps_.back().moved = true;
+}
+
+std::vector<cairn::PathPose<SE2>> Mapper::moved_path(std::size_t particle) const {
+  std::vector<cairn::PathPose<SE2>> path = belief_->path(particle);
+  // Streams of the filter have the step in their upper half; these have all ones there.
+  cairn::Random random(options_.seed, ~(steps_.size() * belief_->size() + particle + 1));
+  std::vector<Vector<3>> noise;
+  for (const Loop& loop : loops_) {
+    const Vector<3> v(random.normal(), random.normal(), random.normal());
+    noise.emplace_back(cairn::Cholesky<3>(loop.covariance).lower() * v);
+  }
+  const std::vector<SE2> moved = conditioned(chain_of(path), loops_, noise);
+  for (std::size_t k = 0; k < moved.size(); ++k) {
+    path[k].drawn_from.mean = moved[k] * (path[k].pose.inverse() * path[k].drawn_from.mean);
+    path[k].pose = moved[k];
+  }
+  return path;
+}
+
+std::vector<cairn::StampedPose2> Mapper::trajectory(bool means) const {
+  const auto path = belief().path(belief().best());
+  std::vector<cairn::StampedPose2> all;
+  all.reserve(scans_.size());
+  for (std::size_t k = 0; k < steps_.size(); ++k) {
+    const auto pose = [&](std::size_t step) {
+      return means ? path[step + 1].drawn_from.mean : path[step + 1].pose;
+    };
+    const std::size_t from = steps_[k].scan;
+    const std::size_t to = k + 1 < steps_.size() ? steps_[k + 1].scan : scans_.size();
+    const SE2 odometry = scans_[from].T_odom_laser.inverse();
+    Vector<3> gap = Vector<3>::Zero();
+    if (k + 1 < steps_.size())
+      gap = cairn::local(SE2(pose(k) * (odometry * scans_[to].T_odom_laser)), pose(k + 1));
+    for (std::size_t i = from; i < to; ++i) {
+      const double share = static_cast<double>(i - from) / static_cast<double>(to - from);
+      const SE2 moved = pose(k) * (odometry * scans_[i].T_odom_laser);
+      all.push_back({scans_[i].time, cairn::retract(moved, Vector<3>(share * gap))});
+    }
+  }
+  return all;
+}
+
+std::vector<cairn::StampedPose2> Mapper::rematched() const {
+  std::vector<cairn::StampedPose2> all = trajectory(true);
+  const OccupancyMap& map = belief()[belief().best()].map;
+  const Matrix<3> prior = Vector<3>(400, 400, 2500).asDiagonal();  // 5 cm, 0.02 rad: what odometry may err
+  cairn::parallel_for(all.size(), options_.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto found = cairn::match(map.grid, cairn::scan_points(scans_[i].scan), all[i].pose, all[i].pose,
+                                      prior, {.model = map.model});
+      if (found.status != cairn::MatchStatus::few_inliers) all[i].pose = found.pose;
+    }
+  });
+  return all;
+}
+
+}  // namespace grid_slam

@@ -1,0 +1,139 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// The grid mapper: scans with odometry in, a path with its spread and a map out.
+///
+/// A scan is processed after so much motion, or where the robot stops; the others get their pose by odometry
+/// between the processed ones. The robot drives forwards or backwards, and odometry does not always know
+/// which: the direction is a part of each particle's state and may change where the robot stood. One setting
+/// serves all logs.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include <cairn/eval/relations.hpp>
+#include <cairn/filter/conditional.hpp>
+#include <cairn/io/carmen.hpp>
+#include <cairn/scan/occupancy_grid.hpp>
+
+#include "loop_closing.hpp"
+#include "occupancy_map.hpp"
+
+namespace grid_slam {
+
+/// Standard deviations of odometry over D metres and A radians: offset + per_metre D + per_radian A.
+struct OdometryNoise {
+  double offset = 0.02, per_metre = 0.1, per_radian = 0.02;                    ///< to either axis [m]
+  double angle_offset = 0.01, angle_per_metre = 0.05, angle_per_radian = 0.1;  ///< of the heading [rad]
+};
+
+struct LoopOptions {
+  bool on = true;
+  double check_every = 0.5;   ///< [m] of path between two looks
+  double apart = 12;          ///< [m] of path between a place and its revisit
+  std::size_t places = 3;     ///< old places that are looked at, at most
+  double reach = 6;           ///< [m]: places farther from where the robot believes to be are not looked at
+  double spacing = 3;         ///< [m] of path between two loops that are kept
+  double submap = 4;          ///< [m] of path to either side of the old place
+  double query = 3;           ///< [m] of path before the new one
+  double enough_score = 0.5;  ///< of the correlation
+  double enough_inliers = 0.75;
+  double gate = 25;           ///< squared Mahalanobis distance of a loop's error in the path's covariance
+  double moved = 0.08;        ///< [m] an error from which on the paths are moved
+  double turned = 0.01;       ///< [rad] the same of the heading
+  std::size_t survivors = 2;  ///< distinct particles when the paths are moved: each costs a map
+};
+
+struct MapperOptions {
+  std::size_t particles = 30;
+  std::uint64_t seed = 1;
+  unsigned threads = 1;
+  double cell_size = 0.05;  ///< [m]
+  double field_radius = 6;  ///< cells
+  cairn::EndPointModel model{.sigma = 0.03, .outliers = 0.05, .independence = 0.42};
+  OdometryNoise odometry{};
+  double step_distance = 0.3;   ///< [m] between processed scans
+  double step_angle = 0.2;      ///< [rad]
+  double standstill = 0.02;     ///< [m] between two scans: the robot stood
+  double turn_back = 0.04;      ///< probability that it goes on in the other direction
+  double turn_unseen = 0.002;   ///< the same where no standstill was seen
+  double slip = 0.002;          ///< probability that odometry says little: a collision, a push
+  double slip_distance = 0.25;  ///< [m], standard deviation of the motion then
+  double slip_angle = 0.25;     ///< [rad]
+  double resample_below = 0.5;
+  double evidence_share = 0.12;
+  double widened = 1;
+  LoopOptions loops{};
+};
+
+/// What a processed scan brought.
+struct StepRecord {
+  std::size_t scan = 0;  ///< index in the log
+  double effective_size = 0;
+  bool resampled = false;
+  bool moved = false;  ///< a loop moved the paths
+  cairn::Gaussian<cairn::SE2> pose;
+};
+
+/// Takes scans one by one.
+class Mapper {
+public:
+  using Belief = cairn::MappedPaths<OccupancyMap>;
+
+  /// Throws cairn::Error on options out of range.
+  explicit Mapper(const MapperOptions& options);
+
+  /// The next scan of the log. Returns whether it was processed. Throws cairn::Error where the filter refuses
+  /// the step, naming why.
+  bool add(const cairn::StampedScan& scan);
+
+  [[nodiscard]] const std::vector<StepRecord>& steps() const noexcept { return steps_; }
+  [[nodiscard]] const std::vector<Loop>& loops() const noexcept { return loops_; }
+  /// Of a mapper that has taken a scan.
+  [[nodiscard]] const Belief& belief() const;
+
+  /// A pose for every scan so far: of the best particle at the processed ones, along the odometry between.
+  /// By the drawn poses, or by the means of the densities that they were drawn from.
+  [[nodiscard]] std::vector<cairn::StampedPose2> trajectory(bool means) const;
+  /// The same, each scan matched once more to the best particle's map: offline.
+  [[nodiscard]] std::vector<cairn::StampedPose2> rematched() const;
+
+private:
+  struct Motion {
+    cairn::SE2 forwards, backwards;
+    double distance = 0, angle = 0;
+    bool stood = false;
+  };
+
+  void accumulate(const cairn::SE2& moved);
+  void process(const cairn::StampedScan& scan);
+  [[nodiscard]] cairn::Matrix<3> motion_noise() const;
+  void look_for_loop();
+  [[nodiscard]] std::vector<std::size_t> old_places(const std::vector<cairn::SE2>& poses,
+                                                    const StepChain& chain) const;
+  void take_loop(const Loop& loop, const cairn::Vector<3>& error);
+  [[nodiscard]] std::optional<Loop> measured_loop(const std::vector<cairn::SE2>& poses, std::size_t first,
+                                                  const cairn::Matrix<3>& covariance) const;
+  void move_paths();
+  [[nodiscard]] std::vector<cairn::PathPose<cairn::SE2>> moved_path(std::size_t particle) const;
+  [[nodiscard]] OccupancyMap empty_map() const;
+
+  MapperOptions options_;
+  std::optional<Belief> belief_;
+  std::vector<StepRecord> steps_;
+  std::vector<std::vector<cairn::ScanPoint>> points_;  // of the processed scans
+  std::vector<double> travelled_;                      // [m] at each pose of the path
+  std::vector<cairn::StampedScan> scans_;
+  std::vector<Loop> loops_;
+  Motion motion_;
+  double looked_ = 0;                      // travelled at the last look for a loop
+  std::optional<cairn::Vector<3>> asked_;  // error of the last loop that asked for a move
+  double asked_at_ = 0;
+};
+
+}  // namespace grid_slam

@@ -1,0 +1,148 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// An occupancy grid as the map of a particle, and the proposal that matches the scan to it.
+///
+/// The proposal of G. Grisetti, C. Stachniss, W. Burgard, "Improved techniques for grid mapping with
+/// Rao-Blackwellized particle filters", T-RO 23, 2007, sec. IV, eq. 15-18, with draws (the paper's released
+/// code takes the optimum) and with the weight that is exact for any density drawn from.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include <cairn/core/cholesky.hpp>
+#include <cairn/core/linalg.hpp>
+#include <cairn/core/random.hpp>
+#include <cairn/filter/conditional.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/manifold/se2.hpp>
+#include <cairn/scan/match.hpp>
+#include <cairn/scan/occupancy_grid.hpp>
+#include <cairn/scan/scan.hpp>
+
+namespace grid_slam {
+
+/// ConditionalMap over occupancy grids. The pose is the laser's, the observation its end points.
+struct OccupancyMap {
+  using Pose = cairn::SE2;
+  using Observation = std::vector<cairn::ScanPoint>;
+
+  cairn::OccupancyGrid grid;
+  cairn::EndPointModel model{};
+
+  [[nodiscard]] double log_likelihood(const Pose& x, const Observation& z) const {
+    return cairn::log_likelihood(grid, z, x, model);
+  }
+  void insert(const Pose& x, const Observation& z) { grid.insert(x, z); }
+};
+
+/// Draws from a Gaussian fitted to likelihood times motion around their best pose.
+struct FromMatch {
+  cairn::MatchOptions match{};
+  std::vector<double> widths{4, 2};  ///< of the kernel over the model's, before its own
+  /// Motions of a smaller share are tried only where the others explain the scan badly, and taken only where
+  /// they explain it well: where nothing does, it is the map that is wrong.
+  double likely_share = 0.05;
+  double explained_badly = 0.75;  ///< share of inliers below which the others are tried
+  double explained_well = 0.75;   ///< share from which on they are taken
+  double rare_share = 0.01;       ///< motions below this have to explain the scan still better
+  double rare_explained = 0.88;
+  double widened = 1.0;  ///< standard deviations of the draws over those fitted
+
+  [[nodiscard]] cairn::Proposed<cairn::SE2> operator()(const OccupancyMap& map,
+                                                       const cairn::RegimeMotion<cairn::SE2>& motion,
+                                                       const OccupancyMap::Observation& z,
+                                                       cairn::Random& random) const {
+    std::vector<Peak> peaks;
+    double inliers = 0;
+    for (const bool likely : {true, false}) {
+      if (!likely && inliers >= explained_badly) break;
+      for (const auto& mode : motion.modes)
+        if ((mode.share >= likely_share) == likely)
+          inliers = std::max(inliers, add_peak(peaks, map, mode, z));
+    }
+    if (peaks.empty()) return cairn::FromMotion{}(map, motion, z, random);
+    std::vector<double> evidence;
+    for (const Peak& peak : peaks) evidence.push_back(peak.log_evidence);
+    const double total = cairn::log_sum_exp(evidence);
+    double left = random.uniform();
+    std::size_t chosen = 0;
+    while (chosen + 1 < peaks.size() && left >= std::exp(evidence[chosen] - total))
+      left -= std::exp(evidence[chosen++] - total);
+    const Peak& peak = peaks[chosen];
+    const cairn::SE2 x = cairn::sample(peak.q, random);
+    const double l = map.log_likelihood(x, z);
+    const double log_target = l + std::log(peak.mode->share) + cairn::log_density(peak.mode->motion, x);
+    const double log_drawn = evidence[chosen] - total + cairn::log_density(peak.q, x);
+    return {x, peak.q, log_target - log_drawn, l, peak.mode->regime};
+  }
+
+private:
+  using Mode = cairn::RegimeMotion<cairn::SE2>::Mode;
+  struct Peak {
+    const Mode* mode;
+    cairn::Gaussian<cairn::SE2> q;
+    double log_evidence;  // Laplace's: the integral of likelihood times motion, if that were q's shape
+  };
+
+  /// Returns the share of points that the best pose of this motion explains.
+  double add_peak(std::vector<Peak>& peaks, const OccupancyMap& map, const Mode& mode,
+                  const OccupancyMap::Observation& z) const {
+    const cairn::Cholesky<3> motion(mode.motion.covariance);
+    if (!motion.good() || !(mode.share > 0)) return 0;
+    cairn::MatchOptions options = match;
+    options.model = map.model;
+    cairn::SE2 start = best_start(map, mode.motion, z);
+    for (const double width : widths) {
+      options.model.sigma = width * map.model.sigma;
+      start = cairn::match(map.grid, z, start, mode.motion.mean, motion.inverse(), options).pose;
+    }
+    options.model = map.model;
+    const cairn::MatchResult found =
+        cairn::match(map.grid, z, start, mode.motion.mean, motion.inverse(), options);
+    const cairn::Cholesky<3> information(found.information);
+    if (found.status == cairn::MatchStatus::few_inliers || !information.good()) return found.inliers;
+    const double enough = mode.share < rare_share ? rare_explained : explained_well;
+    if (mode.share < likely_share && found.inliers < enough) return found.inliers;
+    peaks.push_back({&mode,
+                     {found.pose, widened * widened * information.inverse()},
+                     std::log(mode.share) + found.log_likelihood + found.log_prior -
+                         0.5 * (motion.log_determinant() + information.log_determinant())});
+    return found.inliers;
+  }
+
+  /// The best of a lattice of poses over two standard deviations of the motion, no finer than what the widest
+  /// kernel bridges; the mean itself where the motion is no wider.
+  [[nodiscard]] cairn::SE2 best_start(const OccupancyMap& map, const cairn::Gaussian<cairn::SE2>& motion,
+                                      const OccupancyMap::Observation& z) const {
+    constexpr double reach = 0.15, turn = 0.08;  // [m], [rad] between neighbours
+    const auto count = [](double sigma, double spacing) { return static_cast<int>(2 * sigma / spacing); };
+    const int nx = count(std::sqrt(motion.covariance(0, 0)), reach);
+    const int ny = count(std::sqrt(motion.covariance(1, 1)), reach);
+    const int na = count(std::sqrt(motion.covariance(2, 2)), turn);
+    if (nx + ny + na == 0) return motion.mean;
+    cairn::EndPointModel wide = map.model;
+    wide.sigma *= widths.empty() ? 1 : widths.front();
+    const std::vector<cairn::ScanPoint> few = cairn::thinned(z, 0.2);
+    cairn::SE2 best = motion.mean;
+    double most = cairn::log_likelihood(map.grid, few, best, wide);
+    for (int a = -na; a <= na; ++a)
+      for (int y = -ny; y <= ny; ++y)
+        for (int x = -nx; x <= nx; ++x) {
+          const cairn::SE2 pose =
+              cairn::retract(motion.mean, cairn::Vector<3>(reach * x, reach * y, turn * a));
+          const double l = cairn::log_likelihood(map.grid, few, pose, wide);
+          if (l <= most) continue;
+          most = l;
+          best = pose;
+        }
+    return best;
+  }
+};
+
+}  // namespace grid_slam

@@ -1,0 +1,67 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// What grid_slam leaves in its folder: map.pgm and map.yaml (ROS map_server's), trajectory.txt (TUM),
+/// summary.json, report.html, timing.json. All but the last are the same bytes for the same log, options and
+/// seed, whatever the number of threads.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <cairn/eval/relations.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/manifold/se2.hpp>
+#include <cairn/scan/occupancy_grid.hpp>
+#include <cairn/vision/image.hpp>
+
+#include "mapper.hpp"
+
+namespace grid_slam {
+
+/// A map as a picture: 254 free, 0 occupied, 205 unknown, north up, as map_server has it.
+struct MapImage {
+  cairn::Image image;
+  double cell_size = 0;         ///< [m] a pixel
+  double left = 0, bottom = 0;  ///< of the lower left pixel's lower left corner [m]
+};
+
+/// Of all cells that are known, with a margin of one; one unknown pixel where none is.
+[[nodiscard]] MapImage map_image(const cairn::OccupancyGrid& grid);
+
+/// Bytes of the particles' maps and fields, what they share counted once.
+[[nodiscard]] std::size_t map_bytes(const Mapper::Belief& belief);
+
+struct Results {
+  std::string name;  ///< of the log
+  std::uint64_t seed = 0;
+  std::size_t particles = 0, scans = 0;
+  std::vector<StepRecord> steps;
+  std::vector<Loop> loops;
+  std::vector<cairn::StampedPose2> odometry, drawn, means, rematched;
+  std::optional<cairn::RelationError> of_odometry, of_drawn, of_means, of_rematched;
+  cairn::Gaussian<cairn::SE2> newest;
+  MapImage map;
+  std::size_t bytes = 0;
+  std::vector<std::vector<cairn::SE2>> paths;  ///< of all particles
+  std::optional<std::string> ended_early;
+  unsigned threads = 1;
+  double seconds = 0, cpu_seconds = 0;
+};
+
+[[nodiscard]] std::string summary(const Results& results);
+[[nodiscard]] std::optional<std::string> report(const Results& results);
+
+/// Makes the folder where it is missing and checks that a file can be written. Throws cairn::Error.
+void prepare_folder(const std::filesystem::path& folder);
+
+/// Writes all files or, throwing cairn::Error, none. Returns why there is no report, where there is none.
+[[nodiscard]] std::optional<std::string> write_outputs(const Results& results,
+                                                       const std::filesystem::path& folder);
+
+}  // namespace grid_slam

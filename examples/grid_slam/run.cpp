@@ -1,0 +1,58 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "run.hpp"
+
+#include <chrono>
+#include <ctime>
+
+namespace grid_slam {
+
+namespace {
+
+void measure(Results& r, const std::vector<cairn::PoseRelation>& relations) {
+  if (relations.empty()) return;
+  r.of_odometry = cairn::relation_error(r.odometry, relations);
+  r.of_drawn = cairn::relation_error(r.drawn, relations);
+  r.of_means = cairn::relation_error(r.means, relations);
+  r.of_rematched = cairn::relation_error(r.rematched, relations);
+}
+
+}  // namespace
+
+Results run(const cairn::CarmenLog& log, const MapperOptions& options,
+            const std::vector<cairn::PoseRelation>& relations,
+            const std::function<std::optional<std::string>()>& on_scan) {
+  Results r;
+  r.seed = options.seed;
+  r.particles = options.particles;
+  r.threads = options.threads;
+  const auto begin = std::chrono::steady_clock::now();
+  const std::clock_t cpu = std::clock();
+  Mapper mapper(options);
+  for (const cairn::StampedScan& scan : log.scans) {
+    mapper.add(scan);
+    ++r.scans;
+    r.odometry.push_back({scan.time, scan.T_odom_laser});
+    if (on_scan) r.ended_early = on_scan();
+    if (r.ended_early) break;
+  }
+  r.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  r.cpu_seconds = static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC;
+  r.steps = mapper.steps();
+  r.loops = mapper.loops();
+  r.drawn = mapper.trajectory(false);
+  r.means = mapper.trajectory(true);
+  r.rematched = mapper.rematched();
+  r.newest = mapper.belief().pose();
+  r.map = map_image(mapper.belief()[mapper.belief().best()].map.grid);
+  r.bytes = map_bytes(mapper.belief());
+  for (std::size_t i = 0; i < mapper.belief().size(); ++i) {
+    if (i > 0 && mapper.belief()[i].node == mapper.belief()[i - 1].node) continue;  // the same path
+    auto& path = r.paths.emplace_back();
+    for (const auto& pose : mapper.belief().path(i)) path.push_back(pose.pose);
+  }
+  measure(r, relations);
+  return r;
+}
+
+}  // namespace grid_slam

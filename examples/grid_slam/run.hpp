@@ -1,0 +1,27 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// One run over one log, and everything that is to be said of it.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <cairn/eval/relations.hpp>
+#include <cairn/io/carmen.hpp>
+
+#include "mapper.hpp"
+#include "outputs.hpp"
+
+namespace grid_slam {
+
+/// Maps the log. `on_scan` is called after every scan; what it returns, if anything, ends the run and says
+/// why. Relations may be none. Throws cairn::Error where the log cannot be mapped.
+[[nodiscard]] Results run(const cairn::CarmenLog& log, const MapperOptions& options,
+                          const std::vector<cairn::PoseRelation>& relations,
+                          const std::function<std::optional<std::string>()>& on_scan = {});
+
+}  // namespace grid_slam

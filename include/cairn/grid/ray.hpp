@@ -1,0 +1,80 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// Every cell that a segment meets, in order, with the length of the segment inside.
+///
+/// (J. Amanatides, A. Woo, "A fast voxel traversal algorithm for ray tracing", Eurographics 1987.) Crossings
+/// are computed from the end points, not summed up, so that the last cell is the end's own and the lengths
+/// add up to the segment's however long it is.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+
+#include <cairn/core/check.hpp>
+#include <cairn/grid/tile.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn { inline namespace CAIRN_ABI {
+
+namespace detail {
+
+/// One axis of the walk: the cell, the direction, and at which share of the segment the next border is.
+class RayAxis {
+public:
+  RayAxis(double from, double to)
+      : from_(from),
+        length_(to - from),
+        cell_(static_cast<std::int32_t>(std::floor(from))),
+        last_(static_cast<std::int32_t>(std::floor(to))),
+        step_(last_ < cell_ ? -1 : 1) {
+    aim();
+  }
+
+  [[nodiscard]] std::int32_t cell() const noexcept { return cell_; }
+  [[nodiscard]] double next() const noexcept { return next_; }
+  void advance() noexcept {
+    cell_ += step_;
+    aim();
+  }
+
+private:
+  void aim() noexcept {
+    next_ = cell_ == last_ ? std::numeric_limits<double>::infinity()
+                           : std::min(1.0, (cell_ + (step_ > 0 ? 1 : 0) - from_) / length_);
+  }
+
+  double from_, length_;
+  std::int32_t cell_, last_, step_;
+  double next_ = 0;
+};
+
+}  // namespace detail
+
+/// Calls visit(cell, length) for the cells from (x0, y0) to (x1, y1), all in cells, where each shares an edge
+/// with the one before; through a corner the step along x comes first, and the cell between has length 0. The
+/// end points must be finite and less than 2^28 cells from the origin.
+template <class Visit>
+void walk_ray(double x0, double y0, double x1, double y1, Visit&& visit) {
+  const auto has_cell = [](double x) { return std::abs(x) < static_cast<double>(farthest_cell); };
+  CAIRN_EXPECTS(has_cell(x0) && has_cell(y0) && has_cell(x1) && has_cell(y1),
+                "walk_ray needs finite end points less than 2^28 cells from the origin");
+  const double length = std::hypot(x1 - x0, y1 - y0);
+  detail::RayAxis x(x0, x1), y(y0, y1);
+  double share = 0;
+  for (;;) {
+    const double until = std::min({x.next(), y.next(), 1.0});
+    visit(CellAddress{x.cell(), y.cell()}, std::max(0.0, until - share) * length);
+    share = std::max(share, until);
+    if (std::isinf(x.next()) && std::isinf(y.next())) return;
+    if (x.next() <= y.next())
+      x.advance();
+    else
+      y.advance();
+  }
+}
+
+}}  // namespace cairn::CAIRN_ABI

@@ -1,0 +1,122 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// A grid whose copies share what none of them has changed: the maps of a particle filter.
+///
+///   root -> blocks of 16 x 16 tiles -> tiles of 32 x 32 cells, each counted
+/// Copying is O(1); writing copies the root, one block and one tile where others hold them, and later writes
+/// to the same tile copy nothing. Cells that were never written are Cell{}. Different objects may be used
+/// from different threads at once also where they share tiles; one object may be read by several threads.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <cairn/core/check.hpp>
+#include <cairn/grid/detail/counted.hpp>
+#include <cairn/grid/tile.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn { inline namespace CAIRN_ABI {
+
+template <class Cell>
+class SharedTiles {
+public:
+  using Tile = std::array<Cell, tile_cells>;
+
+  /// The cell, or Cell{} where nothing was written. Two loads and a comparison from the tile's own.
+  [[nodiscard]] const Cell& read(CellAddress cell) const noexcept {
+    const Tile* found = tile(tile_of(cell));
+    return found == nullptr ? empty_ : (*found)[place_in_tile(cell)];
+  }
+  /// The cell of this grid alone. Throws Error where the grid would be wider than 2^16 tiles.
+  [[nodiscard]] Cell& write(CellAddress cell) { return writable_tile(tile_of(cell))[place_in_tile(cell)]; }
+
+  /// The tile, or null where nothing was written.
+  [[nodiscard]] const Tile* tile(TileAddress address) const noexcept {
+    const Root* root = root_.get();
+    if (root == nullptr) return nullptr;
+    const std::size_t place = root->place(address);
+    if (place == none) return nullptr;
+    const Block* block = root->blocks[place].get();
+    return block == nullptr ? nullptr : (*block)[place_in_block(address)].get();
+  }
+  /// The tile of this grid alone; valid until the grid is copied or changed elsewhere.
+  [[nodiscard]] Tile& writable_tile(TileAddress address) {
+    if (!root_ || root_.get()->place(address) == none) grow(address);
+    Root& root = root_.own();
+    return root.blocks[root.place(address)].own()[place_in_block(address)].own();
+  }
+
+  /// Calls visit(address, tile) for every tile there is, by rows of blocks: the same order for equal writes.
+  template <class Visit>
+  void for_each_tile(Visit&& visit) const {
+    const Root* root = root_.get();
+    if (root == nullptr) return;
+    for (std::size_t b = 0; b < root->blocks.size(); ++b) {
+      const Block* block = root->blocks[b].get();
+      if (block == nullptr) continue;
+      const auto column = root->column + static_cast<std::int32_t>(b) % root->columns;
+      const auto row = root->row + static_cast<std::int32_t>(b) / root->columns;
+      for (std::int32_t t = 0; t < block_side * block_side; ++t)
+        if (const Tile* found = (*block)[static_cast<std::size_t>(t)].get())
+          visit(TileAddress{column * block_side + t % block_side, row * block_side + t / block_side}, *found);
+    }
+  }
+
+private:
+  static constexpr std::int32_t block_side = 16;  // tiles
+  static constexpr std::size_t none = ~std::size_t{0};
+  using Block = std::array<detail::Counted<Tile>, static_cast<std::size_t>(block_side* block_side)>;
+
+  /// Blocks in a rectangle that grows to hold what is written.
+  struct Root {
+    std::int32_t column = 0, row = 0, columns = 0, rows = 0;  // in blocks
+    std::vector<detail::Counted<Block>> blocks{};
+
+    [[nodiscard]] std::size_t place(TileAddress tile) const noexcept {
+      const std::int32_t c = (tile.column >> 4) - column, r = (tile.row >> 4) - row;
+      if (c < 0 || r < 0 || c >= columns || r >= rows) return none;
+      return static_cast<std::size_t>(r) * static_cast<std::size_t>(columns) + static_cast<std::size_t>(c);
+    }
+  };
+  [[nodiscard]] static std::size_t place_in_block(TileAddress tile) noexcept {
+    return static_cast<std::size_t>((tile.row & 15) * block_side + (tile.column & 15));
+  }
+
+  void grow(TileAddress address) {
+    constexpr std::int32_t most = 1 << 12;  // blocks a side
+    const std::int32_t c = address.column >> 4, r = address.row >> 4;
+    Root next{c, r, 1, 1, {}};
+    if (const Root* old = root_.get()) {
+      next.column = std::min(c, old->column);
+      next.row = std::min(r, old->row);
+      next.columns = std::max(c + 1, old->column + old->columns) - next.column;
+      next.rows = std::max(r + 1, old->row + old->rows) - next.row;
+    }
+    if (next.columns > most || next.rows > most)
+      raise("SharedTiles: expected cells within a square of 65536 tiles, found tile " +
+            std::to_string(address.column) + ", " + std::to_string(address.row) + " outside of it");
+    next.blocks.resize(static_cast<std::size_t>(next.columns) * static_cast<std::size_t>(next.rows));
+    if (const Root* old = root_.get())
+      for (std::int32_t row = 0; row < old->rows; ++row)
+        for (std::int32_t column = 0; column < old->columns; ++column) {
+          const TileAddress first{(old->column + column) * block_side, (old->row + row) * block_side};
+          next.blocks[next.place(first)] = old->blocks[old->place(first)];
+        }
+    detail::Counted<Root> root;
+    root.own() = std::move(next);
+    root_ = std::move(root);
+  }
+
+  static inline const Cell empty_{};
+  detail::Counted<Root> root_;
+};
+
+}}  // namespace cairn::CAIRN_ABI

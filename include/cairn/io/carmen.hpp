@@ -1,0 +1,212 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// Logs of CARMEN, in which the field's laser data sets are kept: FLASER, ROBOTLASER1 and ODOM lines.
+///
+///   FLASER n r_1..r_n  laser x y theta  robot x y theta  time host logger_time
+///   ROBOTLASER1 type first_angle field_of_view step farthest accuracy mode  n r_1..r_n  m e_1..e_m
+///               laser x y theta  robot x y theta  tv rv forward side turn  time host logger_time
+///   ODOM x y theta tv rv acceleration  time host logger_time
+/// (CARMEN robot navigation toolkit, manual, "log file format".) Metres, radians, seconds. Other lines
+/// (PARAM, SYNC, comments, ...) are of no concern. The order of the file is the order of events, also where
+/// times run back, as in published logs: nothing is sorted.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <filesystem>
+#include <numbers>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include <cairn/io/text.hpp>
+#include <cairn/manifold/se2.hpp>
+#include <cairn/scan/scan.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn { inline namespace CAIRN_ABI {
+
+/// A scan and where odometry believed the scanner to be. The frame is odometry's.
+struct StampedScan {
+  double time = 0;  ///< [s], by the clock of the sensor's computer
+  SE2 T_odom_laser;
+  SE2 T_odom_robot;
+  LaserScan scan;
+};
+
+/// A pose of the wheels' odometry.
+struct StampedOdometry {
+  double time = 0;  ///< [s]
+  SE2 T_odom_robot;
+};
+
+/// What a log holds of scans and odometry, each in the order of the file.
+struct CarmenLog {
+  std::vector<StampedScan> scans;
+  std::vector<StampedOdometry> odometry;
+};
+
+namespace detail {
+
+/// Takes the fields of one line one after the other.
+class CarmenFields {
+public:
+  explicit CarmenFields(const TextLines& lines) : lines_(lines), rest_(lines.line()) { take(); }
+
+  std::string_view take() {
+    rest_ = trimmed(rest_);
+    const std::size_t end = std::min(rest_.find_first_of(" \t"), rest_.size());
+    const std::string_view field = rest_.substr(0, end);
+    rest_.remove_prefix(end);
+    return field;
+  }
+
+  double number(const char* what) {
+    const std::string_view field = take();
+    const std::optional<double> value = parse_number(field);
+    if (!value || !std::isfinite(*value)) refuse(what, "a finite number", field);
+    return *value;
+  }
+
+  /// A number of beams, or of what else there may be a few thousand of.
+  std::size_t count(const char* what) {
+    constexpr std::size_t most = 100000;
+    const std::string_view field = take();
+    const std::optional<std::size_t> value = parse_number<std::size_t>(field);
+    if (!value || *value > most) refuse(what, "a whole number up to 100000", field);
+    return *value;
+  }
+
+  SE2 pose(const char* what) {
+    const double x = number(what), y = number(what), theta = number(what);
+    return {x, y, theta};
+  }
+
+  void ranges(std::vector<float>& out, std::size_t count) {
+    out.reserve(count);
+    for (std::size_t i = 0; i < count; ++i) {
+      const double value = number("a range");
+      out.push_back(static_cast<float>(std::clamp(value, -1e6, 1e6)));
+    }
+  }
+
+private:
+  [[noreturn]] void refuse(const char* what, const char* expected, std::string_view found) const {
+    std::string text(what);
+    text.append(": ").append(expected);
+    if (found.empty())
+      text.append(" (the line ends before it)");
+    else
+      text.append(" ('").append(found.substr(0, 20)).append("' is none)");
+    lines_.fail(text);
+  }
+
+  const TextLines& lines_;
+  std::string_view rest_;
+};
+
+/// FLASER says nothing of its angles. Half a turn from -90 deg on: an odd number of beams has both ends, an
+/// even one leaves the last out, as SICK's scanners of 180 and 360 readings do.
+inline void set_half_turn(LaserScan& scan) {
+  const auto n = static_cast<double>(scan.range.size());
+  scan.first_angle = -std::numbers::pi / 2;
+  scan.angle_step = std::numbers::pi / (scan.range.size() % 2 == 1 ? std::max(1.0, n - 1) : std::max(1.0, n));
+}
+
+inline StampedScan front_laser(CarmenFields fields, double farthest) {
+  StampedScan s;
+  s.scan.farthest = farthest;
+  fields.ranges(s.scan.range, fields.count("the number of ranges"));
+  set_half_turn(s.scan);
+  s.T_odom_laser = fields.pose("the laser's pose");
+  s.T_odom_robot = fields.pose("the robot's pose");
+  s.time = fields.number("the time");
+  return s;
+}
+
+inline StampedScan robot_laser(CarmenFields fields, double farthest) {
+  StampedScan s;
+  fields.number("the type");
+  s.scan.first_angle = fields.number("the first angle");
+  fields.number("the field of view");
+  s.scan.angle_step = fields.number("the angle between beams");
+  s.scan.farthest = std::min(farthest, fields.number("the largest range"));
+  fields.number("the accuracy");
+  fields.number("the mode");
+  fields.ranges(s.scan.range, fields.count("the number of ranges"));
+  for (std::size_t left = fields.count("the number of remissions"); left > 0; --left)
+    fields.number("a remission");
+  s.T_odom_laser = fields.pose("the laser's pose");
+  s.T_odom_robot = fields.pose("the robot's pose");
+  for (const char* what :
+       {"the velocity", "the turn rate", "the forward distance", "the side distance", "the turning axis"})
+    fields.number(what);
+  s.time = fields.number("the time");
+  return s;
+}
+
+inline StampedOdometry odometry(CarmenFields fields) {
+  StampedOdometry o;
+  o.T_odom_robot = fields.pose("the robot's pose");
+  for (const char* what : {"the velocity", "the turn rate", "the acceleration"}) fields.number(what);
+  o.time = fields.number("the time");
+  return o;
+}
+
+}  // namespace detail
+
+/// The scans and the odometry of a CARMEN log; ranges from `farthest` [m] on are no return. Throws Error
+/// naming the line, what was expected and what stands there; where there is no scan at all, Error as well.
+[[nodiscard]] inline CarmenLog read_carmen(const std::filesystem::path& path, double farthest = 40) {
+  if (!(farthest > 0)) raise("read_carmen: expected a largest range above zero");
+  TextLines lines(path, "a CARMEN log");
+  CarmenLog log;
+  while (lines.next()) {
+    const std::string_view line = lines.line();
+    const std::string_view kind = line.substr(0, line.find_first_of(" \t"));
+    if (kind == "FLASER")
+      log.scans.push_back(detail::front_laser(detail::CarmenFields(lines), farthest));
+    else if (kind == "ROBOTLASER1")
+      log.scans.push_back(detail::robot_laser(detail::CarmenFields(lines), farthest));
+    else if (kind == "ODOM")
+      log.odometry.push_back(detail::odometry(detail::CarmenFields(lines)));
+  }
+  if (log.scans.empty()) raise(path.string() + ": expected lines FLASER or ROBOTLASER1, found none");
+  return log;
+}
+
+/// Gives every scan a pose of the odometry, where the scans' own poses are all the same though the ODOM
+/// lines move (logs of CARMEN without a localisation): the newest one before it by time, moved on between
+/// neighbours in proportion. Throws Error where there is neither.
+inline void place_by_odometry(CarmenLog& log, const std::string& name) {
+  const auto moves = [](const auto& list, auto pose) {
+    return std::ranges::any_of(list, [&](const auto& each) {
+      return local(pose(list.front()), pose(each)).cwiseAbs().maxCoeff() > 1e-6;
+    });
+  };
+  if (log.scans.size() < 2 || moves(log.scans, [](const auto& s) { return s.T_odom_robot; })) return;
+  if (log.odometry.empty() || !moves(log.odometry, [](const auto& o) { return o.T_odom_robot; })) {
+    if (log.odometry.empty())
+      raise(name +
+            ": expected scans with odometry, found scans that all carry the same pose and no ODOM line");
+    return;
+  }
+  const auto& odometry = log.odometry;
+  for (StampedScan& scan : log.scans) {
+    const auto after = std::ranges::upper_bound(odometry, scan.time, {}, &StampedOdometry::time);
+    SE2 pose = after == odometry.begin() ? odometry.front().T_odom_robot : std::prev(after)->T_odom_robot;
+    if (after != odometry.begin() && after != odometry.end()) {
+      const double gap = after->time - std::prev(after)->time;
+      const double share = gap > 0 ? std::clamp((scan.time - std::prev(after)->time) / gap, 0.0, 1.0) : 0.0;
+      pose = retract(pose, Tangent<SE2>(share * local(pose, after->T_odom_robot)));
+    }
+    scan.T_odom_laser = pose * (scan.T_odom_robot.inverse() * scan.T_odom_laser);
+    scan.T_odom_robot = pose;
+  }
+}
+
+}}  // namespace cairn::CAIRN_ABI

@@ -1,0 +1,98 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include <cairn/grid/ray.hpp>
+
+#include "support/random.hpp"
+#include "support/violation.hpp"
+
+namespace ray_test {
+namespace {
+
+using namespace cairn;
+
+/// Length of the segment inside a cell, by clipping it against the cell's four sides.
+double clipped(double x0, double y0, double x1, double y1, CellAddress cell) {
+  double from = 0, to = 1;
+  const auto clip = [&](double start, double step, double low) {
+    if (step == 0) {
+      if (start < low || start >= low + 1) to = -1;
+      return;
+    }
+    const double a = (low - start) / step, b = (low + 1 - start) / step;
+    from = std::max(from, std::min(a, b));
+    to = std::min(to, std::max(a, b));
+  };
+  clip(x0, x1 - x0, cell.column);
+  clip(y0, y1 - y0, cell.row);
+  return std::max(0.0, to - from) * std::hypot(x1 - x0, y1 - y0);
+}
+
+}  // namespace
+
+TEST_SUITE("grid/ray") {
+  TEST_CASE("ray: the cells and lengths are those that clipping every cell of the box gives") {
+    const std::uint64_t seed = cairn_test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (int trial = 0; trial < 500; ++trial) {
+      const double x0 = random.uniform(-15, 15), y0 = random.uniform(-15, 15);
+      const double x1 = trial % 10 == 0 ? x0 : random.uniform(-15, 15);
+      const double y1 = trial % 10 == 1 ? y0 : random.uniform(-15, 15);
+      std::map<CellAddress, double> walked;
+      double sum = 0;
+      walk_ray(x0, y0, x1, y1, [&](CellAddress cell, double length) {
+        REQUIRE(walked.count(cell) == 0);
+        walked[cell] = length;
+        sum += length;
+      });
+      CHECK(sum == doctest::Approx(std::hypot(x1 - x0, y1 - y0)));
+      for (int row = -16; row < 16; ++row)
+        for (int column = -16; column < 16; ++column) {
+          const CellAddress cell{column, row};
+          const double expected = clipped(x0, y0, x1, y1, cell);
+          const double found = walked.count(cell) != 0 ? walked[cell] : 0.0;
+          REQUIRE(std::abs(found - expected) < 1e-9);
+        }
+    }
+  }
+
+  TEST_CASE("ray: begins in the start's cell, ends in the end's, and steps over edges") {
+    const std::uint64_t seed = cairn_test::seed(2);
+    CAPTURE(seed);
+    Random random(seed);
+    for (int trial = 0; trial < 2000; ++trial) {
+      // Whole numbers too: corners and borders.
+      const auto draw = [&] {
+        return trial % 2 == 0 ? std::floor(random.uniform(-8, 8)) : random.uniform(-3000, 3000);
+      };
+      const double x0 = draw(), y0 = draw(), x1 = draw(), y1 = draw();
+      std::vector<CellAddress> cells;
+      walk_ray(x0, y0, x1, y1, [&](CellAddress cell, double) { cells.push_back(cell); });
+      const auto cell_at = [](double x, double y) {
+        return CellAddress{static_cast<int>(std::floor(x)), static_cast<int>(std::floor(y))};
+      };
+      REQUIRE(cells.front() == cell_at(x0, y0));
+      REQUIRE(cells.back() == cell_at(x1, y1));
+      for (std::size_t i = 1; i < cells.size(); ++i)
+        REQUIRE(std::abs(cells[i].column - cells[i - 1].column) + std::abs(cells[i].row - cells[i - 1].row) ==
+                1);
+    }
+  }
+
+  TEST_CASE("ray: end points without a cell break its promise") {
+    CHECK_FALSE(cairn_test::violation_of([] {
+                  walk_ray(0, 0, std::nan(""), 0, [](CellAddress, double) {});
+                }).empty());
+    CHECK_FALSE(
+        cairn_test::violation_of([] { walk_ray(0, 1e30, 0, 0, [](CellAddress, double) {}); }).empty());
+  }
+}
+
+}  // namespace ray_test

@@ -1,0 +1,177 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "mapper.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include <cairn/core/random.hpp>
+
+#include "floor_plan.hpp"
+#include "occupancy_map.hpp"
+#include "run.hpp"
+#include "support/folder.hpp"
+#include "support/random.hpp"
+
+namespace mapper_test {
+namespace {
+
+using namespace cairn;
+using namespace grid_slam;
+
+Drive short_drive(std::uint64_t seed, std::size_t scans) {
+  Drive drive = simulated_drive({.seed = seed});
+  drive.log.scans.resize(scans);
+  drive.truth.resize(scans);
+  return drive;
+}
+
+std::vector<double> numbers_of(const Results& r) {
+  std::vector<double> all;
+  for (const auto* path : {&r.drawn, &r.means, &r.rematched})
+    for (const StampedPose2& p : *path)
+      for (const double n : {p.time, p.pose.x(), p.pose.y(), p.pose.angle()}) all.push_back(n);
+  for (const StepRecord& s : r.steps) all.push_back(s.effective_size);
+  return all;
+}
+
+/// A map of the first poses' scans at the true poses, and the scan of the pose after them.
+struct Seen {
+  OccupancyMap map{OccupancyGrid({.geometry = {}, .field_radius = 6}), {.independence = 0.42}};
+  std::vector<ScanPoint> points;
+  SE2 truth;
+};
+
+Seen seen_in_the_corridor() {
+  const Drive drive = short_drive(2, 61);
+  Seen seen;
+  for (std::size_t i = 0; i < 60; i += 3)
+    seen.map.insert(drive.truth[i], scan_points(drive.log.scans[i].scan));
+  seen.points = scan_points(drive.log.scans[60].scan);
+  seen.truth = drive.truth[60];
+  return seen;
+}
+
+}  // namespace
+
+TEST_SUITE("grid_slam/mapper") {
+  TEST_CASE("mapper: the proposal's exact weight integrates to what a lattice of poses gives, mean and all") {
+    const Seen seen = seen_in_the_corridor();
+    const Gaussian<SE2> motion{retract(seen.truth, Vector<3>(0.02, -0.02, 0.01)),
+                               Matrix<3>(Vector<3>(9e-4, 9e-4, 4e-4).asDiagonal())};
+    double integral = 0, most = -1e300;
+    std::vector<double> terms;
+    Vector<3> mean = Vector<3>::Zero();
+    constexpr int half = 24;
+    const Vector<3> spacing(0.0045, 0.0045, 0.003);
+    std::vector<Vector<3>> steps;
+    for (int a = -half; a <= half; ++a)
+      for (int y = -half; y <= half; ++y)
+        for (int x = -half; x <= half; ++x) {
+          steps.push_back(Vector<3>(x, y, a).cwiseProduct(spacing));
+          const SE2 pose = retract(motion.mean, steps.back());
+          terms.push_back(seen.map.log_likelihood(pose, seen.points) + log_density(motion, pose));
+          most = std::max(most, terms.back());
+        }
+    for (std::size_t i = 0; i < terms.size(); ++i) {
+      integral += std::exp(terms[i] - most) * spacing.prod();
+      mean += std::exp(terms[i] - most) * spacing.prod() * steps[i];
+    }
+    mean /= integral;
+
+    RegimeMotion<SE2> regimes;
+    regimes.modes.push_back({0, 1, motion});
+    for (const double widened : {1.0, 1.5}) {
+      FromMatch proposal;
+      proposal.widened = widened;
+      Random random(cairn_test::seed());
+      constexpr int draws = 1500;
+      double sum = 0;
+      Vector<3> drawn = Vector<3>::Zero();
+      for (int i = 0; i < draws; ++i) {
+        const auto p = proposal(seen.map, regimes, seen.points, random);
+        const double weight = std::exp(p.log_weight - most);
+        sum += weight / draws;
+        drawn += weight / draws * local(motion.mean, p.pose);
+      }
+      drawn /= sum;
+      CHECK(sum == doctest::Approx(integral).epsilon(0.05));
+      CHECK((drawn - mean).head<2>().norm() < 1e-3);
+      CHECK(std::abs(drawn(2) - mean(2)) < 5e-4);
+    }
+  }
+
+  TEST_CASE("mapper: the same bytes for 1, 2 and 7 threads, and a pose for every scan") {
+    const Drive drive = short_drive(1, 120);
+    const auto with = [&](unsigned threads) {
+      return run(drive.log, {.particles = 5, .seed = 9, .threads = threads}, {});
+    };
+    const Results one = with(1);
+    CHECK(one.means.size() == 120);
+    CHECK(numbers_of(one) == numbers_of(with(2)));
+    CHECK(numbers_of(one) == numbers_of(with(7)));
+  }
+
+  TEST_CASE("mapper: a log in another frame is mapped as well") {
+    Drive drive = short_drive(1, 200);
+    const auto relations = true_relations(drive);
+    const Results here = run(drive.log, {.particles = 4}, relations);
+    const SE2 frame(123.4, -56.7, 1.1);
+    for (StampedScan& scan : drive.log.scans) {
+      scan.T_odom_laser = frame * scan.T_odom_laser;
+      scan.T_odom_robot = frame * scan.T_odom_robot;
+    }
+    const Results there = run(drive.log, {.particles = 4}, relations);
+    REQUIRE(here.of_means);
+    CHECK(here.of_means->mean < 0.03);
+    CHECK(std::abs(here.of_means->mean - there.of_means->mean) < 0.005);
+  }
+
+  TEST_CASE("mapper: odometry that reports reversing as going forwards is seen through") {
+    Drive drive = short_drive(1, 240);
+    // Up to scan 150, a stop, and back to scan 90; the wheels report the way back as a way ahead.
+    CarmenLog log;
+    std::vector<SE2> truth;
+    std::vector<std::size_t> order;
+    for (std::size_t i = 0; i <= 150; ++i) order.push_back(i);
+    for (int i = 0; i < 5; ++i) order.push_back(150);
+    for (std::size_t i = 150; i-- > 90;) order.push_back(i);
+    SE2 odometry;
+    for (std::size_t k = 0; k < order.size(); ++k) {
+      if (k > 0) {
+        Vector<3> step = local(drive.truth[order[k - 1]], drive.truth[order[k]]);
+        if (order[k] < order[k - 1]) step.head<2>() = -step.head<2>();
+        odometry = retract(odometry, step);
+      }
+      StampedScan scan = drive.log.scans[order[k]];
+      scan.time = 0.2 * static_cast<double>(k);
+      scan.T_odom_laser = scan.T_odom_robot = odometry;
+      log.scans.push_back(scan);
+      truth.push_back(drive.truth[order[k]]);
+    }
+    const Results r = run(log, {.particles = 6}, {});
+    const auto off = [&](const std::vector<StampedPose2>& path) {
+      return (SE2(truth.front().inverse() * truth.back()).translation() -
+              SE2(path.front().pose.inverse() * path.back().pose).translation())
+          .norm();
+    };
+    CHECK(off(r.odometry) > 8);
+    CHECK(off(r.means) < 0.15);
+  }
+
+  TEST_CASE("mapper: options out of range are refused in words") {
+    CHECK(cairn_test::message_of([] { const Mapper none({.particles = 0}); }).find("particle") !=
+          std::string::npos);
+    MapperOptions bad;
+    bad.model.sigma = -1;
+    CHECK(cairn_test::message_of([&] { const Mapper none(bad); }).find("model") != std::string::npos);
+    bad = {};
+    bad.cell_size = 0;
+    CHECK(cairn_test::message_of([&] { const Mapper none(bad); }).find("cell size") != std::string::npos);
+  }
+}
+
+}  // namespace mapper_test

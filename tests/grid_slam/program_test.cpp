@@ -1,0 +1,128 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+// The program as a user meets it: its exit code, its words and what it leaves behind.
+#include "support/program.hpp"
+
+#include <csignal>
+#include <filesystem>
+#include <set>
+#include <string>
+
+#include <doctest/doctest.h>
+#include <nlohmann/json.hpp>
+
+#include <cairn/io/file.hpp>
+#include <cairn/io/netpbm.hpp>
+#include <cairn/version.hpp>
+
+#include "floor_plan.hpp"
+#include "support/folder.hpp"
+#include "support/report.hpp"
+
+namespace grid_program_test {
+namespace {
+
+namespace fs = std::filesystem;
+using cairn_test::names_in;
+using cairn_test::Outcome;
+
+const std::string program = GRID_SLAM_PROGRAM;
+
+Outcome run(const std::string& arguments, const std::string& standard_output = "") {
+  return cairn_test::run_program("\"" + program + "\" " + arguments, standard_output);
+}
+
+std::set<std::string> results() {
+  std::set<std::string> names{"map.pgm", "map.yaml", "trajectory.txt", "summary.json", "timing.json"};
+  if (example::has_report_page()) names.insert("report.html");
+  return names;
+}
+
+/// The first scans of a rendered drive as a CARMEN log.
+std::string short_log(std::size_t scans) {
+  const grid_slam::Drive drive = grid_slam::simulated_drive({.seed = 3});
+  std::string text;
+  for (std::size_t i = 0; i < scans; ++i) {
+    const cairn::StampedScan& s = drive.log.scans[i];
+    text += "FLASER " + std::to_string(s.scan.size());
+    for (const float r : s.scan.range) text += " " + cairn::shortest(r);
+    for (int twice = 0; twice < 2; ++twice)
+      for (const double n : {s.T_odom_laser.x(), s.T_odom_laser.y(), s.T_odom_laser.angle()})
+        text += " " + cairn::shortest(n);
+    text += " " + cairn::shortest(s.time) + " host 0\n";
+  }
+  return text;
+}
+
+}  // namespace
+
+TEST_SUITE("grid_slam/program") {
+  TEST_CASE("grid_slam: a mistake is exit code 2 and a line") {
+    const cairn_test::Folder folder;
+    folder.put("empty", "");
+    folder.put("torn", "FLASER 3 1 2\n");
+    folder.put("nan", "FLASER 1 nan 0 0 0 0 0 0 1 h 0\n");
+    folder.put("still", "FLASER 1 1 0 0 0 0 0 0 1 h 0\nFLASER 1 1 0 0 0 0 0 0 2 h 0\n");
+    folder.put("log", short_log(3));
+    const auto named = [&](const char* name) { return "\"" + (folder / name).string() + "\""; };
+    for (const std::string& mistake :
+         {std::string("--nonsense"), std::string("--particles 0"), std::string("--threads 0"),
+          std::string("--seed -1"), "--log " + named("none"), "--log " + named("empty"),
+          "--log " + named("torn"), "--log " + named("nan"), "--log " + named("still"),
+          "--log " + named("log") + " --relations " + named("log"), "--simulate --log " + named("log")}) {
+      CAPTURE(mistake);
+      const Outcome outcome = run(mistake + " --out \"" + (folder / "out").string() + "\"");
+      CAPTURE(outcome.words);
+      CHECK(outcome.code == 2);
+      CHECK(outcome.words.size() > 10);
+      CHECK_FALSE(fs::exists(folder / "out"));
+    }
+  }
+
+  TEST_CASE("grid_slam: --version and --help say what they are asked, or that they cannot") {
+    CHECK(run("--version").words == "grid_slam " CAIRN_VERSION_STRING "\n");
+    CHECK(run("--help").says("--relations"));
+    CHECK(run("--help", "/dev/full").code == 2);
+  }
+
+  TEST_CASE("grid_slam: the same seed gives the same bytes but for times, and the files are what they say") {
+    const cairn_test::Folder folder;
+    folder.put("log", short_log(150));
+    for (const std::string threads : {"1", "3"}) {
+      const Outcome outcome =
+          run("--particles 4 --seed 5 --threads " + threads + " --log \"" + (folder / "log").string() +
+              "\" --out \"" + (folder / threads).string() + "\"");
+      CAPTURE(outcome.words);
+      REQUIRE(outcome.code == 0);
+      CHECK(outcome.says("scans 100 %"));
+      CHECK(names_in(folder / threads) == results());
+    }
+    for (const std::string& name : results()) {
+      CAPTURE(name);
+      CHECK((cairn::read_file(folder / "1" / name) == cairn::read_file(folder / "3" / name)) ==
+            (name != "timing.json"));
+    }
+    const auto summary = nlohmann::json::parse(cairn::read_file(folder / "1" / "summary.json"));
+    CHECK(summary["scans"] == 150);
+    CHECK(summary["relations"]["means"].is_null());
+    const cairn::Netpbm map = cairn::read_netpbm(folder / "1" / "map.pgm");
+    CHECK(map.width == summary["map"]["width"]);
+    const std::string yaml = cairn::read_file(folder / "1" / "map.yaml");
+    CHECK(yaml.find("resolution: 0.05\n") != std::string::npos);
+    CHECK(yaml.find("image: map.pgm\n") == 0);
+    const std::string path = cairn::read_file(folder / "1" / "trajectory.txt");
+    CHECK(std::count(path.begin(), path.end(), '\n') == 150);
+  }
+
+  TEST_CASE("grid_slam: interrupted, it writes the scans until then") {
+    const cairn_test::Folder folder;
+    CHECK(cairn_test::interrupt_program({program, "--particles", "2", "--out", (folder / "out").string()},
+                                        {SIGTERM}, 1) == 4);
+    CHECK(names_in(folder / "out") == results());
+    const auto summary = nlohmann::json::parse(cairn::read_file(folder / "out" / "summary.json"));
+    CHECK(summary["ended_early"].get<std::string>().find("interrupted (SIGTERM)") == 0);
+  }
+}
+
+}  // namespace grid_program_test

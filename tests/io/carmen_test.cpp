@@ -1,0 +1,108 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include <doctest/doctest.h>
+
+#include <cairn/io/carmen.hpp>
+
+#include "support/folder.hpp"
+
+namespace carmen_test {
+namespace {
+
+using namespace cairn;
+
+constexpr const char* front = "FLASER 4 1.5 2 50 0.01 1 2 0.5 1.1 2.1 0.6 10.5 host 0.1\n";
+constexpr const char* robot =
+    "ROBOTLASER1 0 -1 2 0.5 30 0.01 0 3 1 2 40 1 9 1 2 0.5 1.1 2.1 0.6 0 0 0 0 0 11.5 host 0.2\n";
+constexpr const char* wheels = "ODOM 1 2 0.5 0 0 0 9.5 host 0.1\n";
+
+std::string words_of(const std::string& text) {
+  const cairn_test::Folder folder;
+  folder.put("log", text);
+  return cairn_test::message_of([&] { static_cast<void>(read_carmen(folder / "log")); });
+}
+
+CarmenLog read(const std::string& text) {
+  const cairn_test::Folder folder;
+  folder.put("log", text);
+  return read_carmen(folder / "log");
+}
+
+}  // namespace
+
+TEST_SUITE("io/carmen") {
+  TEST_CASE("carmen: FLASER, ROBOTLASER1 and ODOM say what their fields say") {
+    const CarmenLog log = read(std::string("# a comment\nPARAM a b c\n") + front + robot + wheels);
+    REQUIRE(log.scans.size() == 2);
+    REQUIRE(log.odometry.size() == 1);
+    const StampedScan& a = log.scans[0];
+    CHECK(a.time == 10.5);
+    CHECK(a.T_odom_laser.x() == 1);
+    CHECK(a.T_odom_robot.angle() == 0.6);
+    CHECK(a.scan.angle(0) == doctest::Approx(-std::numbers::pi / 2));
+    CHECK(a.scan.angle(3) ==
+          doctest::Approx(std::numbers::pi / 4));  // the last of an even number is left out
+    CHECK(a.scan.kind(0) == BeamKind::hit);
+    CHECK(a.scan.kind(2) == BeamKind::no_return);
+    CHECK(a.scan.kind(3) == BeamKind::invalid);
+    const StampedScan& b = log.scans[1];
+    CHECK(b.time == 11.5);
+    CHECK(b.scan.first_angle == -1);
+    CHECK(b.scan.angle_step == 0.5);
+    CHECK(b.scan.farthest == 30);
+    CHECK(b.scan.size() == 3);
+    CHECK(log.odometry[0].time == 9.5);
+    CHECK(log.odometry[0].T_odom_robot.y() == 2);
+  }
+
+  TEST_CASE("carmen: the order is the file's, also where times run back") {
+    const std::string early = "FLASER 1 1 0 0 0 0 0 0 5 host 0\n", late = "FLASER 1 1 0 0 0 0 0 0 6 host 0\n";
+    const CarmenLog log = read(late + early + late);
+    REQUIRE(log.scans.size() == 3);
+    CHECK(log.scans[1].time == 5);
+  }
+
+  TEST_CASE("carmen: bad lines are refused with the line and what was expected") {
+    CHECK(words_of("").find("none") != std::string::npos);
+    CHECK(words_of(wheels).find("expected lines FLASER or ROBOTLASER1, found none") != std::string::npos);
+    CHECK(words_of("FLASER 3 1 2\n").find("log:1: expected a range: a finite number (the line ends") !=
+          std::string::npos);
+    CHECK(words_of(std::string(front) + "FLASER 2 1 nan 0 0 0 0 0 0 1 h 0\n").find("log:2: ") !=
+          std::string::npos);
+    CHECK(words_of("FLASER -2 1 2\n").find("whole number") != std::string::npos);
+    CHECK(words_of("FLASER 1000000000 1 2\n").find("100000") != std::string::npos);
+    CHECK(words_of("FLASER 1 1 0 0 0 0 0 x 1 h 0\n").find("the robot's pose") != std::string::npos);
+    CHECK(words_of("ROBOTLASER1 0 0 0 0 30 0 0 1 1 0 0 0 0 0 0 0 0 0 0 0 x\n").find("turning axis") !=
+          std::string::npos);
+    CHECK(words_of("FLASER\n").find("number of ranges") != std::string::npos);
+    const cairn_test::Folder folder;
+    CHECK_FALSE(cairn_test::message_of([&] { static_cast<void>(read_carmen(folder / "none")); }).empty());
+  }
+
+  TEST_CASE("carmen: scans that all carry one pose get theirs from the odometry between its neighbours") {
+    const std::string scan = "FLASER 1 1 0.1 0 0 0 0 0 ";
+    const auto odometry = [](double x, double t) {
+      return "ODOM " + shortest(x) + " 0 0 0 0 0 " + shortest(t) + " h 0\n";
+    };
+    CarmenLog log =
+        read(odometry(0, 1) + odometry(2, 2) + scan + "0.5 h 0\n" + scan + "1.25 h 0\n" + scan + "3 h 0\n");
+    place_by_odometry(log, "log");
+    CHECK(log.scans[0].T_odom_robot.x() == doctest::Approx(0));
+    CHECK(log.scans[1].T_odom_robot.x() == doctest::Approx(0.5));
+    CHECK(log.scans[1].T_odom_laser.x() == doctest::Approx(0.6));  // 0.1 m ahead of the robot
+    CHECK(log.scans[2].T_odom_robot.x() == doctest::Approx(2));
+
+    CarmenLog none = read(scan + "1 h 0\n" + scan + "2 h 0\n");
+    CHECK(cairn_test::message_of([&] { place_by_odometry(none, "log"); }).find("no ODOM line") !=
+          std::string::npos);
+    CarmenLog own = read(std::string(front) + "FLASER 1 1 9 0 0 9 0 0 1 h 0\n" + wheels);
+    place_by_odometry(own, "log");
+    CHECK(own.scans[1].T_odom_laser.x() == 9);
+  }
+}
+
+}  // namespace carmen_test

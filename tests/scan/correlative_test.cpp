@@ -1,0 +1,124 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include <cairn/scan/correlative.hpp>
+
+#include "support/folder.hpp"
+#include "support/random.hpp"
+
+namespace correlative_test {
+namespace {
+
+using namespace cairn;
+
+ScoreGrid drawn_grid(Random& random, int side) {
+  ScoreGrid grid({0.1, 0, 0}, {-side / 2, -side / 2}, side, side);
+  const std::uint64_t filled = 5 + random.below(60);
+  for (std::uint64_t i = 0; i < filled; ++i)
+    grid(static_cast<int>(random.below(static_cast<unsigned>(side))),
+         static_cast<int>(random.below(static_cast<unsigned>(side)))) =
+        static_cast<std::uint8_t>(1 + random.below(255));
+  return grid;
+}
+
+std::vector<ScanPoint> drawn_points(Random& random, double reach) {
+  std::vector<ScanPoint> points;
+  const std::uint64_t count = 1 + random.below(12);
+  for (std::uint64_t i = 0; i < count; ++i)
+    points.push_back({random.uniform(-reach, reach), random.uniform(-reach, reach)});
+  return points;
+}
+
+/// The best score of all poses of the lattice, one by one.
+double exhaustive(const CorrelativeSearch& search, const std::vector<ScanPoint>& points, const SE2& middle,
+                  const SearchWindow& window) {
+  const double step = search.heading_step(points);
+  const int a = static_cast<int>(window.angle / step), x = static_cast<int>(window.x / 0.1),
+            y = static_cast<int>(window.y / 0.1);
+  double best = 0;
+  for (int i = -a; i <= a; ++i)
+    for (int j = -y; j <= y; ++j)
+      for (int k = -x; k <= x; ++k)
+        best = std::max(best, search.score(points, SE2(middle.x() + 0.1 * k, middle.y() + 0.1 * j,
+                                                       middle.angle() + i * step)));
+  return best;
+}
+
+}  // namespace
+
+TEST_SUITE("scan/correlative") {
+  TEST_CASE("correlative: the best score is that of looking at every pose") {
+    const std::uint64_t seed = cairn_test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    for (int trial = 0; trial < 1000; ++trial) {
+      const CorrelativeSearch search(drawn_grid(random, 24), 1 + static_cast<int>(random.below(5)));
+      const auto points = drawn_points(random, 0.8);
+      // Off the cells' borders: a sum of steps may round across one.
+      const SE2 middle(0.03 + 0.1 * static_cast<double>(random.below(5)),
+                       0.07 - 0.1 * static_cast<double>(random.below(5)), random.uniform(-3, 3));
+      const SearchWindow window{random.uniform(0, 0.9), random.uniform(0, 0.9), random.uniform(0, 0.4)};
+      const auto found = search.find(points, middle, window);
+      const double best = exhaustive(search, points, middle, window);
+      REQUIRE((found ? found->score : 0.0) == doctest::Approx(best).epsilon(1e-12));
+      if (!found) continue;
+      REQUIRE(search.score(points, found->pose) == doctest::Approx(best).epsilon(1e-12));
+      REQUIRE(std::abs(found->pose.x() - middle.x()) <= window.x + 1e-9);
+      REQUIRE(std::abs(wrapped(found->pose.angle() - middle.angle())) <= window.angle + 1e-9);
+    }
+  }
+
+  TEST_CASE("correlative: a square's largest is the largest of its cells") {
+    const std::uint64_t seed = cairn_test::seed(2);
+    CAPTURE(seed);
+    Random random(seed);
+    const ScoreGrid grid = drawn_grid(random, 20);
+    for (const int side : {1, 2, 3, 4, 7, 8, 16}) {
+      const ScoreGrid wide = grid.largest_of_squares(side);
+      for (int row = 0; row < wide.rows(); ++row)
+        for (int column = 0; column < wide.columns(); ++column) {
+          int largest = 0;
+          for (int r = 0; r < side; ++r)
+            for (int c = 0; c < side; ++c)
+              largest = std::max(largest, grid.at(column - side + 1 + c, row - side + 1 + r));
+          REQUIRE(wide.at(column, row) == largest);
+        }
+    }
+  }
+
+  TEST_CASE("correlative: nothing is found above what there is, or without points") {
+    ScoreGrid grid({0.1, 0, 0}, {0, 0}, 10, 10);
+    grid(5, 5) = 128;
+    const CorrelativeSearch search(grid, 3);
+    const std::vector<ScanPoint> one{{0, 0}};
+    CHECK(search.find(one, SE2(0.55, 0.25, 0), {0.5, 0.5, 0}));
+    CHECK_FALSE(search.find(one, SE2(0.55, 0.25, 0), {0.5, 0.5, 0}, 0.51));
+    CHECK_FALSE(search.find(one, SE2(0.55, 0.25, 0), {0.5, 0.2, 0}));
+    CHECK_FALSE(search.find({}, SE2(), {}));
+    CHECK_FALSE(search.find(one, SE2(1e5, 1e5, 0), {}));
+  }
+
+  TEST_CASE("correlative: bad windows, middles and sizes are refused in words") {
+    const CorrelativeSearch search(ScoreGrid({0.1, 0, 0}, {0, 0}, 4, 4), 2);
+    const std::vector<ScanPoint> one{{0, 0}};
+    const auto words = [&](const SE2& middle, const SearchWindow& window) {
+      return cairn_test::message_of([&] { static_cast<void>(search.find(one, middle, window)); });
+    };
+    CHECK(words(SE2(), {1000, 1, 0}).find("window") != std::string::npos);
+    CHECK(words(SE2(), {1, std::nan(""), 0}).find("window") != std::string::npos);
+    CHECK(words(SE2(), {1, 1, 4}).find("window") != std::string::npos);
+    CHECK(words(SE2(1e12, 0, 0), {}).find("origin") != std::string::npos);
+    CHECK(cairn_test::message_of([] { const ScoreGrid grid({}, {}, 0, 3); }).find("16384") !=
+          std::string::npos);
+    CHECK(cairn_test::message_of([] {
+            const CorrelativeSearch none(ScoreGrid({}, {}, 3, 3), 0);
+          }).find("levels") != std::string::npos);
+  }
+}
+
+}  // namespace correlative_test

@@ -1,0 +1,161 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <map>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include <cairn/scan/occupancy_grid.hpp>
+
+#include "support/folder.hpp"
+#include "support/random.hpp"
+
+namespace occupancy_grid_test {
+namespace {
+
+using namespace cairn;
+
+/// Points on a square room's walls, seen from inside.
+std::vector<ScanPoint> room_seen_from(const SE2& pose, Random& random, double sigma) {
+  std::vector<ScanPoint> points;
+  for (int i = 0; i < 90; ++i) {
+    const double angle = 0.07 * i, c = std::cos(pose.angle() + angle), s = std::sin(pose.angle() + angle);
+    const double rx = (c > 0 ? 2 - pose.x() : -2 - pose.x()) / c;
+    const double ry = (s > 0 ? 2 - pose.y() : -2 - pose.y()) / s;
+    const double r = std::min(rx, ry) + sigma * random.normal();
+    points.push_back({r * std::cos(angle), r * std::sin(angle)});
+  }
+  return points;
+}
+
+/// The field's distance [cells] at a cell by looking at every obstacle of the grid.
+double nearest_obstacle(const OccupancyGrid& grid, CellAddress at) {
+  double best = 1e9;
+  for (int row = at.row - 8; row <= at.row + 8; ++row)
+    for (int column = at.column - 8; column <= at.column + 8; ++column) {
+      const OccupancyCell& c = grid.cells().read({column, row});
+      if (!c.is_obstacle()) continue;
+      best = std::min(best, std::hypot(column + c.mean_x / 65536.0 - at.column - 0.5,
+                                       row + c.mean_y / 65536.0 - at.row - 0.5));
+    }
+  return best;
+}
+
+}  // namespace
+
+TEST_SUITE("scan/occupancy_grid") {
+  TEST_CASE("occupancy_grid: visits and hits are those of counting every beam's cells as a set") {
+    const std::uint64_t seed = cairn_test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    OccupancyGrid grid;
+    std::map<CellAddress, std::pair<int, int>> counts;  // visits, hits
+    for (int scan = 0; scan < 20; ++scan) {
+      const SE2 pose(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-3, 3));
+      const auto points = room_seen_from(pose, random, 0.02);
+      std::map<CellAddress, bool> seen;  // whether a beam ended there
+      for (const ScanPoint& p : points) {
+        const Vector<2> q = pose * Vector<2>(p.x, p.y);
+        walk_ray(pose.x() / 0.05, pose.y() / 0.05, q(0) / 0.05, q(1) / 0.05,
+                 [&](CellAddress cell, double) { seen[cell] = seen[cell]; });
+        seen[grid.geometry().cell_of(q(0), q(1))] = true;
+      }
+      for (const auto& [cell, hit] : seen) {
+        ++counts[cell].first;
+        counts[cell].second += hit;
+      }
+      grid.insert(pose, points);
+    }
+    for (const auto& [cell, count] : counts) {
+      REQUIRE(grid.cells().read(cell).visits == count.first);
+      REQUIRE(grid.cells().read(cell).hits == count.second);
+    }
+    CHECK(grid.cells().read({1000, 1000}).occupancy() == 0.5);
+  }
+
+  TEST_CASE("occupancy_grid: after every scan the field is that of all obstacles, also of those gone") {
+    const std::uint64_t seed = cairn_test::seed(2);
+    CAPTURE(seed);
+    Random random(seed);
+    OccupancyGrid grid;
+    for (int scan = 0; scan < 12; ++scan) {
+      const SE2 pose(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-3, 3));
+      grid.insert(pose, room_seen_from(pose, random, scan < 4 ? 0.3 : 0.01));  // ghosts first
+    }
+    std::size_t near = 0;
+    for (int row = -60; row < 60; ++row)
+      for (int column = -60; column < 60; ++column) {
+        const NearestObstacle& found = grid.field().read({column, row});
+        const double expected = nearest_obstacle(grid, {column, row});
+        if (std::abs(expected - 5) < 0.06) continue;
+        REQUIRE(found.found() == (expected < 5));
+        if (!found.found()) continue;
+        ++near;
+        REQUIRE(std::abs(std::hypot(found.dx, found.dy) / 20.0 - expected) < 0.09);
+      }
+    CHECK(near > 1000);
+  }
+
+  TEST_CASE("occupancy_grid: many scans at once make the map of one after the other") {
+    const std::uint64_t seed = cairn_test::seed(3);
+    CAPTURE(seed);
+    Random random(seed);
+    std::vector<SE2> poses;
+    std::vector<std::vector<ScanPoint>> points;
+    OccupancyGrid one, all;
+    for (int scan = 0; scan < 15; ++scan) {
+      poses.emplace_back(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-3, 3));
+      points.push_back(room_seen_from(poses.back(), random, 0.05));
+      one.insert(poses.back(), points.back());
+    }
+    all.insert_all(
+        poses.size(), [&](std::size_t i) { return poses[i]; },
+        [&](std::size_t i) -> const std::vector<ScanPoint>& { return points[i]; });
+    for (int row = -60; row < 60; ++row)
+      for (int column = -60; column < 60; ++column) {
+        REQUIRE(one.cells().read({column, row}) == all.cells().read({column, row}));
+        REQUIRE(one.field().read({column, row}) == all.field().read({column, row}));
+      }
+  }
+
+  TEST_CASE("occupancy_grid: the normal of a wall is across it, and a lone point has none") {
+    OccupancyGrid grid;
+    std::vector<ScanPoint> wall;
+    for (int i = -20; i <= 20; ++i) wall.push_back({1.02, 0.04 * i});
+    wall.push_back({-1.5, 0});
+    grid.insert(SE2(0, 0, 0.5), wall);
+    const SE2 turned(0, 0, 0.5);
+    const Vector<2> middle = turned * Vector<2>(1.02, 0.0), lone = turned * Vector<2>(-1.5, 0.0);
+    const NearestObstacle& at = grid.field().read(grid.geometry().cell_of(middle(0), middle(1)));
+    REQUIRE(at.has_line());
+    CHECK(std::abs(at.normal_x * std::cos(0.5) + at.normal_y * std::sin(0.5)) / 127 > 0.99);
+    CHECK_FALSE(grid.field().read(grid.geometry().cell_of(lone(0), lone(1))).has_line());
+  }
+
+  TEST_CASE("occupancy_grid: counts stay below 256 and what was an obstacle can be free again") {
+    OccupancyGrid grid;
+    const std::vector<ScanPoint> near{{1.01, 0.01}}, far{{2.01, 0.01}};
+    for (int i = 0; i < 600; ++i) grid.insert(SE2(), near);
+    const CellAddress cell = grid.geometry().cell_of(1.01, 0.01);
+    CHECK(grid.cells().read(cell).is_obstacle());
+    for (int i = 0; i < 600; ++i) grid.insert(SE2(), far);
+    CHECK_FALSE(grid.cells().read(cell).is_obstacle());
+    CHECK_FALSE(grid.field().read(cell).found());
+  }
+
+  TEST_CASE("occupancy_grid: a bad cell size and points without a cell are refused in words") {
+    for (const double size : {0.0, -1.0, std::nan("")})
+      CHECK(cairn_test::message_of([&] {
+              const OccupancyGrid grid({.geometry = {size, 0, 0}});
+            }).find("cell size") != std::string::npos);
+    OccupancyGrid grid;
+    CHECK(cairn_test::message_of([&] { grid.insert(SE2(1e12, 0, 0), {{1, 1}}); }).find("2^28") !=
+          std::string::npos);
+    CHECK(grid.empty());
+    grid.insert(SE2(), {});
+    CHECK(grid.empty());
+  }
+}
+
+}  // namespace occupancy_grid_test
