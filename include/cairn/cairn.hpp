@@ -17,6 +17,7 @@
 #include <cairn/eval/association.hpp>
 #include <cairn/eval/consistency.hpp>
 #include <cairn/eval/kitti_metric.hpp>
+#include <cairn/eval/relations.hpp>
 #include <cairn/eval/trajectory_error.hpp>
 #include <cairn/field/correlation.hpp>
 #include <cairn/field/field_map.hpp>
@@ -32,6 +33,7 @@
 #include <cairn/filter/affine.hpp>
 #include <cairn/filter/augmented_unscented.hpp>
 #include <cairn/filter/batch.hpp>
+#include <cairn/filter/conditional.hpp>
 #include <cairn/filter/constraint.hpp>
 #include <cairn/filter/differentiate.hpp>
 #include <cairn/filter/ensemble.hpp>
@@ -74,6 +76,10 @@
 #include <cairn/geometry/stereo_pose_options.hpp>
 #include <cairn/geometry/stereo_rig.hpp>
 #include <cairn/geometry/triangulation.hpp>
+#include <cairn/grid/distance_field.hpp>
+#include <cairn/grid/ray.hpp>
+#include <cairn/grid/shared_tiles.hpp>
+#include <cairn/grid/tile.hpp>
 #include <cairn/index/axis_metrics.hpp>
 #include <cairn/index/batch_search.hpp>
 #include <cairn/index/best_bin_first.hpp>
@@ -96,6 +102,7 @@
 #include <cairn/index/principal_axes.hpp>
 #include <cairn/index/ratio_test.hpp>
 #include <cairn/index/tree_file.hpp>
+#include <cairn/io/carmen.hpp>
 #include <cairn/io/file.hpp>
 #include <cairn/io/netpbm.hpp>
 #include <cairn/io/ply.hpp>
@@ -114,8 +121,16 @@
 #include <cairn/models/linear.hpp>
 #include <cairn/models/motion.hpp>
 #include <cairn/models/sensor.hpp>
+#include <cairn/scan/correlative.hpp>
+#include <cairn/scan/match.hpp>
+#include <cairn/scan/occupancy_grid.hpp>
+#include <cairn/scan/scan.hpp>
+#include <cairn/simd/matrix_product.hpp>
 #include <cairn/simd/registers.hpp>
 #include <cairn/simd/shuffle.hpp>
+#include <cairn/slam/keyframe_map.hpp>
+#include <cairn/slam/map_location.hpp>
+#include <cairn/slam/world_pose.hpp>
 #include <cairn/version.hpp>
 #include <cairn/vision/fast_hessian.hpp>
 #include <cairn/vision/features.hpp>
