@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: MIT
 //
 // The program as a user meets it: its exit code, its words and what it leaves behind.
-#include "support/program.hpp"
-
 #include <csignal>
 #include <filesystem>
 #include <set>
@@ -16,7 +14,7 @@
 #include <cairn/version.hpp>
 
 #include "support/folder.hpp"
-#include "support/report.hpp"
+#include "support/program_checks.hpp"
 
 namespace correlation_program_test {
 namespace {
@@ -32,36 +30,21 @@ Outcome run(const std::string& arguments, const std::string& standard_output = "
 }
 
 std::set<std::string> results() {
-  std::set<std::string> names{"summary.json", "errors.csv", "timing.json"};
-  if (example::has_report_page()) names.insert("report.html");
-  return names;
+  return cairn_test::with_report({"summary.json", "errors.csv", "timing.json"});
 }
 
 }  // namespace
 
 TEST_SUITE("correlation_navigation/program") {
   TEST_CASE("correlation_navigation: a mistake is exit code 2 and a line") {
-    for (const std::string mistake :
-         {"--nonsense", "--runs 0", "--runs -3", "--starts many", "--threads 0", "--seed -1", "--spacing nan",
-          "--spacing 0", "--spacing inf", "--out", "somewhere"}) {
-      CAPTURE(mistake);
-      const Outcome outcome = run(mistake);
-      CAPTURE(outcome.words);
-      CHECK(outcome.code == 2);
-      CHECK(outcome.words.size() > 10);
-      CHECK(outcome.words.size() < 200);
-    }
+    cairn_test::check_mistakes(
+        [](const std::string& mistake) { return run(mistake); },
+        {"--nonsense", "--runs 0", "--runs -3", "--starts many", "--threads 0", "--seed -1", "--spacing nan",
+         "--spacing 0", "--spacing inf", "--out", "somewhere"});
   }
 
   TEST_CASE("correlation_navigation: --version and --help say what they are asked, or that they cannot") {
-    CHECK(run("--version").code == 0);
-    CHECK(run("--version").words == "correlation_navigation " CAIRN_VERSION_STRING "\n");
-    CHECK(run("--help").says("--terrain"));
-    for (const char* asked : {"--version", "--help"}) {
-      const Outcome outcome = run(asked, "/dev/full");
-      CHECK(outcome.code == 2);
-      CHECK(outcome.says("cannot write to the standard output (No space left on device)"));
-    }
+    cairn_test::check_version_and_help(run, "correlation_navigation " CAIRN_VERSION_STRING "\n", "--terrain");
   }
 
   TEST_CASE("correlation_navigation: a terrain that cannot be read is named, and nothing is left behind") {
@@ -89,11 +72,7 @@ TEST_SUITE("correlation_navigation/program") {
                                      "acquisition 100 %", "flight with turns 100 %", "loop 100 %"})
         CHECK(outcome.says(experiment));
     }
-    for (const std::string& name : results()) {
-      CAPTURE(name);
-      CHECK((cairn::read_file(folder / "1" / name) == cairn::read_file(folder / "2" / name)) ==
-            (name != "timing.json"));
-    }
+    cairn_test::check_same_bytes(folder / "1", folder / "2", results());
     const auto timing = nlohmann::json::parse(cairn::read_file(folder / "2" / "timing.json"));
     CHECK(timing["threads"] == 2);
     CHECK(timing["seconds"].get<double>() > 0);

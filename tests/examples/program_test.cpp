@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: MIT
 //
 // The program as a user meets it: its exit code, its words and what it leaves behind.
-#include "support/program.hpp"
-
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
@@ -20,6 +18,7 @@
 #include <cairn/version.hpp>
 
 #include "support/folder.hpp"
+#include "support/program_checks.hpp"
 #include "support/report.hpp"
 
 namespace program_test {
@@ -52,10 +51,8 @@ nlohmann::json summary_in(const fs::path& out) {
 }
 
 std::set<std::string> results() {
-  std::set<std::string> names{"trajectory.tum", "trajectory.kitti", "trajectory_covariance.csv",
-                              "map.ply",        "summary.json",     "timing.json"};
-  if (example::has_report_page()) names.insert("report.html");
-  return names;
+  return cairn_test::with_report({"trajectory.tum", "trajectory.kitti", "trajectory_covariance.csv",
+                                  "map.ply", "summary.json", "timing.json"});
 }
 
 /// A drive of `frames` frames in the folder "drive".
@@ -85,17 +82,11 @@ TEST_SUITE("program") {
   }
 
   TEST_CASE("stereo_slam: a mistake on the command line is exit code 2 and a sentence") {
-    for (const std::string mistake :
-         {"--store forest", "--points many", "--threads 0", "--frames -3", "--frames 1e99", "--nonsense",
-          "--script up", "--seed -1", "--seed 99999999999999999999", "--drift nan", "--drift 1e308", "--out",
-          "somewhere", "--frames 99999999999999999999999999999999999999999999999999999999999999"}) {
-      CAPTURE(mistake);
-      const Outcome outcome = run(mistake);
-      CAPTURE(outcome.words);
-      CHECK(outcome.code == 2);
-      CHECK(outcome.words.size() > 10);
-      CHECK(outcome.words.size() < 200);
-    }
+    cairn_test::check_mistakes(
+        [](const std::string& mistake) { return run(mistake); },
+        {"--store forest", "--points many", "--threads 0", "--frames -3", "--frames 1e99", "--nonsense",
+         "--script up", "--seed -1", "--seed 99999999999999999999", "--drift nan", "--drift 1e308", "--out",
+         "somewhere", "--frames 99999999999999999999999999999999999999999999999999999999999999"});
     CHECK(run("--dataset nowhere").code == 2);
     CHECK(run("--frames -3").says("--frames: expected a whole number of at least 0, found '-3'"));
   }

@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: MIT
 //
 // The program as a user meets it: its exit code, its words and what it leaves behind.
-#include "support/program.hpp"
-
 #include <csignal>
 #include <filesystem>
 #include <set>
@@ -18,7 +16,7 @@
 
 #include "floor_plan.hpp"
 #include "support/folder.hpp"
-#include "support/report.hpp"
+#include "support/program_checks.hpp"
 
 namespace grid_program_test {
 namespace {
@@ -34,9 +32,7 @@ Outcome run(const std::string& arguments, const std::string& standard_output = "
 }
 
 std::set<std::string> results() {
-  std::set<std::string> names{"map.pgm", "map.yaml", "trajectory.txt", "summary.json", "timing.json"};
-  if (example::has_report_page()) names.insert("report.html");
-  return names;
+  return cairn_test::with_report({"map.pgm", "map.yaml", "trajectory.txt", "summary.json", "timing.json"});
 }
 
 /// The first scans of a rendered drive as a CARMEN log.
@@ -66,24 +62,21 @@ TEST_SUITE("grid_slam/program") {
     folder.put("still", "FLASER 1 1 0 0 0 0 0 0 1 h 0\nFLASER 1 1 0 0 0 0 0 0 2 h 0\n");
     folder.put("log", short_log(3));
     const auto named = [&](const char* name) { return "\"" + (folder / name).string() + "\""; };
-    for (const std::string& mistake :
-         {std::string("--nonsense"), std::string("--particles 0"), std::string("--threads 0"),
-          std::string("--seed -1"), "--log " + named("none"), "--log " + named("empty"),
-          "--log " + named("torn"), "--log " + named("nan"), "--log " + named("still"),
-          "--log " + named("log") + " --relations " + named("log"), "--simulate --log " + named("log")}) {
-      CAPTURE(mistake);
-      const Outcome outcome = run(mistake + " --out \"" + (folder / "out").string() + "\"");
-      CAPTURE(outcome.words);
-      CHECK(outcome.code == 2);
-      CHECK(outcome.words.size() > 10);
-      CHECK_FALSE(fs::exists(folder / "out"));
-    }
+    const auto run_there = [&](const std::string& mistake) {
+      return run(mistake + " --out \"" + (folder / "out").string() + "\"");
+    };
+    cairn_test::check_mistakes(
+        run_there,
+        {"--nonsense", "--particles 0", "--threads 0", "--seed -1", "--log " + named("none"),
+         "--log " + named("empty"), "--log " + named("torn"), "--log " + named("nan"),
+         "--log " + named("still"), "--log " + named("log") + " --relations " + named("log"),
+         "--simulate --log " + named("log")},
+        300);
+    CHECK_FALSE(fs::exists(folder / "out"));
   }
 
   TEST_CASE("grid_slam: --version and --help say what they are asked, or that they cannot") {
-    CHECK(run("--version").words == "grid_slam " CAIRN_VERSION_STRING "\n");
-    CHECK(run("--help").says("--relations"));
-    CHECK(run("--help", "/dev/full").code == 2);
+    cairn_test::check_version_and_help(run, "grid_slam " CAIRN_VERSION_STRING "\n", "--relations");
   }
 
   TEST_CASE("grid_slam: the same seed gives the same bytes but for times, and the files are what they say") {
@@ -98,11 +91,7 @@ TEST_SUITE("grid_slam/program") {
       CHECK(outcome.says("scans 100 %"));
       CHECK(names_in(folder / threads) == results());
     }
-    for (const std::string& name : results()) {
-      CAPTURE(name);
-      CHECK((cairn::read_file(folder / "1" / name) == cairn::read_file(folder / "3" / name)) ==
-            (name != "timing.json"));
-    }
+    cairn_test::check_same_bytes(folder / "1", folder / "3", results());
     const auto summary = nlohmann::json::parse(cairn::read_file(folder / "1" / "summary.json"));
     CHECK(summary["scans"] == 150);
     CHECK(summary["relations"]["means"].is_null());
