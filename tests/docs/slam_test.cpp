@@ -3,10 +3,12 @@
 //
 // The examples in the headers of cairn/slam, compiled and run: see CMakeLists.txt.
 #include <algorithm>
+#include <cstddef>
 #include <vector>
 
 #include <doctest/doctest.h>
 
+#include <cairn/geometry/triangulation.hpp>
 #include <cairn/slam/keyframe_map.hpp>
 
 #include "slam/simulated_arena.hpp"
@@ -32,9 +34,13 @@ TEST_CASE("docs: the example of keyframe_map.hpp makes two keyframes") {
   const cairn::SE3 guess = arena[1].T_world_camera;
 #include "snippets/slam/keyframe_map_1.inc"
   CHECK(map.keyframe_count() == 2);
-  const std::size_t shown = first.size() + second.unmatched.size();
-  CHECK(map.landmark_count() <= shown);
-  CHECK(map.landmark_count() + shown / 50 >= shown);  // a sighting of few pixels' disparity may make no point
+  // A sighting of too few pixels' disparity makes no point.
+  const auto makes_a_point = [&](const cairn::StereoSighting& seen) {
+    return cairn::Triangulator(rig)(seen.left, seen.right, seen.sigma, seen.sigma).good();
+  };
+  const auto points =
+      std::ranges::count_if(first, makes_a_point) + std::ranges::count_if(second.unmatched, makes_a_point);
+  CHECK(static_cast<std::ptrdiff_t>(map.landmark_count()) == points);
 }
 
 }  // namespace docs_slam_test
