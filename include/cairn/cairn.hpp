@@ -102,6 +102,7 @@
 #include <cairn/index/principal_axes.hpp>
 #include <cairn/index/ratio_test.hpp>
 #include <cairn/index/tree_file.hpp>
+#include <cairn/io/binary_file.hpp>
 #include <cairn/io/carmen.hpp>
 #include <cairn/io/file.hpp>
 #include <cairn/io/netpbm.hpp>
@@ -129,6 +130,7 @@
 #include <cairn/simd/registers.hpp>
 #include <cairn/simd/shuffle.hpp>
 #include <cairn/slam/keyframe_map.hpp>
+#include <cairn/slam/keyframe_map_file.hpp>
 #include <cairn/slam/map_location.hpp>
 #include <cairn/slam/world_pose.hpp>
 #include <cairn/version.hpp>

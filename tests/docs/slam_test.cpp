@@ -4,12 +4,14 @@
 // The examples in the headers of cairn/slam, compiled and run: see CMakeLists.txt.
 #include <algorithm>
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
 
 #include <cairn/geometry/triangulation.hpp>
 #include <cairn/slam/keyframe_map.hpp>
+#include <cairn/slam/keyframe_map_file.hpp>
 
 #include "slam/simulated_arena.hpp"
 
@@ -41,6 +43,13 @@ TEST_CASE("docs: the example of keyframe_map.hpp makes two keyframes") {
   const auto points =
       std::ranges::count_if(first, makes_a_point) + std::ranges::count_if(second.unmatched, makes_a_point);
   CHECK(static_cast<std::ptrdiff_t>(map.landmark_count()) == points);
+}
+
+TEST_CASE("docs: the example of keyframe_map_file.hpp loads what it saved") {
+  cairn::KeyframeMap map(cairn_test::arena_rig());
+  map.begin(cairn::SE3());
+#include "snippets/slam/keyframe_map_file_1.inc"
+  CHECK(loaded.keyframe_count() == 1);
 }
 
 }  // namespace docs_slam_test

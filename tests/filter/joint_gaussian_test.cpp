@@ -615,6 +615,33 @@ TEST_SUITE("joint_gaussian") {
           "refused: a block that is named is not in the state, or is named twice");
   }
 
+  TEST_CASE(
+      "joint_gaussian: put together anew from means and a covariance, is the same and learns the same") {
+    Scene scene(5);
+    REQUIRE(scene.belief.marginalise(scene.landmarks[1]) == Status::accepted);  // so that rows have a gap
+    const Matrix<d, d> p = scene.belief.covariance();
+    Slam other;
+    std::vector<BlockId<Vector<2>>> landmarks;
+    const auto robot = other.add(scene.belief.mean(scene.robot), Matrix<3>::Identity()).id;
+    for (const std::size_t i : {0U, 2U, 3U, 4U})
+      landmarks.push_back(other.add(scene.belief.mean(scene.landmarks[i]), Matrix<2>::Identity()).id);
+    REQUIRE(other.set_covariance(p) == Status::accepted);
+    CHECK(other.covariance() == p);
+    const auto z = Sighting::measurement(3, 0.4);
+    REQUIRE(JointExtended{}.update(other, Sighting{}, z, robot, landmarks[2]).accepted());
+    REQUIRE(JointExtended{}.update(scene.belief, Sighting{}, z, scene.robot, scene.landmarks[3]).accepted());
+    CHECK(largest_difference(other.covariance(), scene.belief.covariance()) < 1e-14);
+
+    Matrix<d, d> bad = p;
+    bad(0, 0) = -1;
+    const Matrix<d, d> before = other.covariance();
+    CHECK(other.set_covariance(bad) == Status::not_positive_definite);
+    bad(0, 0) = std::numeric_limits<double>::quiet_NaN();
+    CHECK(other.set_covariance(bad) == Status::not_finite);
+    CHECK(other.set_covariance(p.topLeftCorner(4, 4)) == Status::size_mismatch);
+    CHECK(other.covariance() == before);
+  }
+
   TEST_CASE("joint_gaussian: rows of blocks that went are used again, so that a window takes no more room") {
     Slam belief;
     const auto robot = belief.add(SE2(), Matrix<3>::Zero()).id;

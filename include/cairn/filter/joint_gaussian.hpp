@@ -317,6 +317,27 @@ public:
     return {enlist(value, core_.write_extension(d)), Status::accepted};
   }
 
+  /// Gives all blocks this joint covariance, in the order of blocks(), in the tangent spaces at the means:
+  /// for a state that comes from elsewhere, a file say. Refused: another size, numbers that are not finite,
+  /// no covariance. O(n^3).
+  Status set_covariance(const Matrix<dynamic, dynamic, Scalar>& p) {
+    if (p.rows() != dof_ || p.cols() != dof_) return Status::size_mismatch;
+    if (!all_finite(p)) return Status::not_finite;
+    const Matrix<dynamic, dynamic, Scalar> symmetric = symmetrised(p);
+    if (!detail::is_valid_covariance<dynamic, Scalar>(symmetric)) return Status::not_positive_definite;
+    std::vector<int> row;
+    row.reserve(static_cast<std::size_t>(dof_));
+    for (const AnyBlockId id : order_) {
+      const detail::RowRange rows = range(*find(id));
+      for (int i = 0; i < rows.count; ++i) row.push_back(rows.first + i);
+    }
+    for (std::size_t i = 0; i < row.size(); ++i)
+      for (std::size_t j = 0; j <= i; ++j)
+        core_.rows().row(std::max(row[i], row[j]))[std::min(row[i], row[j])] =
+            symmetric(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    return Status::accepted;
+  }
+
   // Blocks go, or take another order.
 
   /// Removes a block: what is left is the marginal of the others, unchanged. Its rows are used again by the

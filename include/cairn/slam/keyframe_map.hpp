@@ -85,7 +85,11 @@ struct KeyframeMapOptions {
       9;  ///< a keyframe learns from lists that may grow unless its variance is so much larger
 };
 
-/// The map. Needs a rig with a baseline.
+namespace detail {
+struct KeyframeMapFile;
+}
+
+/// The map. Needs a rig with a baseline. Saved and loaded by keyframe_map_file.hpp.
 class KeyframeMap {
 public:
   explicit KeyframeMap(const StereoRig& rig, const KeyframeMapOptions& options = {})
@@ -94,15 +98,8 @@ public:
         correction_(rig),
         gate_(chi_square_quantile(options.gate_probability, 4)),
         efficiency_(robust_efficiency(options.loss, options.loss_scale, options.gate_probability, gate_, 4)) {
-    CAIRN_EXPECTS(rig.baseline() > 0, "KeyframeMap: the rig needs a baseline");
-    CAIRN_EXPECTS(options.sightings >= 1 && options.sightings <= static_cast<int>(detail::most_sightings) &&
-                      options.sightings_a_visit >= 1,
-                  "KeyframeMap: a list has one to six sightings, and one a visit at least");
-    CAIRN_EXPECTS(options.max_keyframes >= 4, "KeyframeMap: expected room for four keyframes");
-    CAIRN_EXPECTS(options.rig_sigma >= 0 && std::isfinite(options.rig_sigma),
-                  "KeyframeMap: a rig's sigma is not negative");
-    CAIRN_EXPECTS(options.loss_scale > 0 && options.first_sigma > 0 && options.min_matches >= 3,
-                  "KeyframeMap: scales and sigmas are positive, and a pose needs three matches");
+    const char* const fault = fault_of(options, rig);
+    CAIRN_EXPECTS(fault == nullptr, fault);
   }
 
   // What there is.
@@ -115,7 +112,17 @@ public:
   [[nodiscard]] std::size_t keyframes_added() const noexcept { return keyframes_.size(); }
   [[nodiscard]] std::size_t landmark_count() const noexcept { return landmarks_.size(); }
   [[nodiscard]] bool contains(std::uint32_t landmark) const noexcept { return place_.contains(landmark); }
+  /// Ascending.
+  [[nodiscard]] std::vector<std::uint32_t> landmark_ids() const {
+    std::vector<std::uint32_t> ids;
+    for (const detail::KeyframeLandmark& one : landmarks_) ids.push_back(one.id);
+    std::ranges::sort(ids);
+    return ids;
+  }
+  /// As it is believed to be, and as it was given.
   [[nodiscard]] const StereoRig& rig() const noexcept { return rig_; }
+  [[nodiscard]] const StereoRig& nominal_rig() const noexcept { return correction_.nominal(); }
+  [[nodiscard]] const KeyframeMapOptions& options() const noexcept { return options_; }
   /// Poses of the keyframes that are there, in the order in which they came.
   [[nodiscard]] std::vector<SE3> keyframe_poses() const {
     std::vector<SE3> poses;
@@ -326,6 +333,8 @@ public:
   }
 
 private:
+  friend struct detail::KeyframeMapFile;
+
   struct Keyframe {
     BlockId<WorldPose> block;
     std::size_t sightings = 0;       // in lists
@@ -335,6 +344,24 @@ private:
   };
   using Entry = detail::FrameEntry;
   using Work = detail::FrameWork;
+
+  /// What a map cannot be made with, as a sentence, or null.
+  [[nodiscard]] static const char* fault_of(const KeyframeMapOptions& options,
+                                            const StereoRig& rig) noexcept {
+    if (!(rig.baseline() > 0)) return "KeyframeMap: the rig needs a baseline";
+    if (options.sightings < 1 || options.sightings > static_cast<int>(detail::most_sightings) ||
+        options.sightings_a_visit < 1)
+      return "KeyframeMap: a list has one to six sightings, and one a visit at least";
+    if (options.max_keyframes < 4) return "KeyframeMap: expected room for four keyframes";
+    if (!(options.rig_sigma >= 0 && std::isfinite(options.rig_sigma)))
+      return "KeyframeMap: a rig's sigma is not negative";
+    if (!(options.loss_scale > 0 && options.first_sigma > 0) || options.min_matches < 3)
+      return "KeyframeMap: scales and sigmas are positive, and a pose needs three matches";
+    const auto is_share = [](double p) { return p > 0 && p < 1; };
+    if (!is_share(options.gate_probability) || !is_share(options.contradiction))
+      return "KeyframeMap: probabilities lie between 0 and 1";
+    return nullptr;
+  }
 
   static void check(const StereoSighting& s) {
     if (all_finite(s.left) && all_finite(s.right) && s.sigma > 0 && std::isfinite(s.sigma)) return;
