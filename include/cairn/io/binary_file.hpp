@@ -18,8 +18,9 @@
 ///
 /// cairn::BinaryReader in(bytes, "example ", 1, "an example");  // throws where anything is wrong
 /// double sum = 0;
-/// for (std::size_t left = in.count<std::uint32_t>(sizeof(double)); left > 0; --left) sum +=
-/// in.get<double>(); in.expect_end();
+/// std::size_t left = in.count<std::uint32_t>(sizeof(double));
+/// for (; left > 0; --left) sum += in.get<double>();
+/// in.expect_end();
 /// ```
 #pragma once
 
