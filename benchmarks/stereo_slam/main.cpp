@@ -16,12 +16,18 @@
 #include <utility>
 #include <vector>
 
+#include <unistd.h>
+
+#include <cairn/core/random.hpp>
 #include <cairn/eval/kitti_metric.hpp>
 #include <cairn/eval/trajectory_error.hpp>
 #include <cairn/io/text.hpp>
 
+#include "arena_dataset.hpp"
+#include "arena_script.hpp"
 #include "dataset.hpp"
 #include "pipeline.hpp"
+#include "saved_map.hpp"
 #include "summary.hpp"
 #include "support/scoreboard.hpp"
 
@@ -221,6 +227,57 @@ void add_raw_rows(Scoreboard& board, stereo_slam::Calibration calibrate) {
   add(board, {.name = name + ": frames lost", .unit = "", .must = 0}, lost, drive.has_value());
 }
 
+/// Views near the path of a map that was saved and loaded, each by itself: up to half a metre beside it,
+/// turned by up to fifteen degrees.
+void add_relocalisation_rows(Scoreboard& board) {
+  constexpr std::size_t views = 50;
+  constexpr double near = 0.02, turned = 0.3;  // [m, degrees]
+  stereo_slam::ArenaOptions arena;
+  arena.script = "loop";
+  const auto lap = stereo_slam::open_arena(arena, stereo_slam::loop_lap(), 2);
+  stereo_slam::PipelineOptions how;
+  stereo_slam::Pipeline mapping(lap->rig(), how);
+  for (std::size_t i = 0; i < lap->size(); ++i) mapping.step(lap->frame(i));
+  const fs::path file = fs::temp_directory_path() / ("cairn_map_" + std::to_string(::getpid()));
+  stereo_slam::save_map(file, mapping.map());
+  const stereo_slam::SavedMap saved = stereo_slam::load_map(file);
+  fs::remove(file);
+
+  cairn::Random random(1);
+  std::vector<stereo_slam::Stance> stances;
+  const std::vector<stereo_slam::Stance> path = stereo_slam::script_stances(arena.script);
+  for (std::size_t i = 0; i < views; ++i) {
+    stereo_slam::Stance stance = path[random.below(stereo_slam::loop_lap())];
+    stance.x += random.uniform(-0.5, 0.5);
+    stance.y += random.uniform(-0.5, 0.5);
+    stance.heading += random.uniform(-15, 15) / stereo_slam::degrees;
+    stances.push_back(stance);
+  }
+  const auto seen = stereo_slam::open_arena_views(arena, stances, 2);
+  const cairn::SE3 T_truth_world = *lap->frame(0).truth;
+  how.localise = true;
+  std::size_t found = 0, wrong = 0;
+  for (std::size_t i = 0; i < views; ++i) {
+    stereo_slam::Pipeline pipeline(seen->rig(), how, saved, "map");
+    const stereo_slam::StereoFrame frame = seen->frame(i);
+    const stereo_slam::FrameRecord& record = pipeline.step(frame);
+    if (!record.tracked) continue;
+    const stereo_slam::FrameError error =
+        stereo_slam::frame_error(record.T_world_camera, T_truth_world.inverse() * *frame.truth);
+    ++(error.position < near && error.heading * stereo_slam::degrees < turned ? found : wrong);
+  }
+  board.add({.name = "50 views in a saved map: found within 0.02 m and 0.3 deg",
+             .measured = 100.0 * static_cast<double>(found) / views,
+             .unit = "%",
+             .must = 95,
+             .aim = 100,
+             .better = cairn_bench::larger});
+  board.add({.name = "50 views in a saved map: wrong",
+             .measured = static_cast<double>(wrong),
+             .unit = "",
+             .must = 0});
+}
+
 /// The pictures are in the cache by now, so that the rate is that of the system and not of the renderer.
 void add_rate_row(Scoreboard& board) {
   stereo_slam::DatasetOptions what;
@@ -253,6 +310,7 @@ int main(int argc, char** argv) {
     add_odometry_rows(board, calibrate);
     add_raw_rows(board, calibrate);
   }
+  add_relocalisation_rows(board);
   add_rate_row(board);
   return board.finish();
 }

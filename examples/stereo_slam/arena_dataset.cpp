@@ -44,14 +44,13 @@ void check(const ArenaOptions& o) {
 
 class Arena final : public Dataset {
 public:
-  Arena(const ArenaOptions& options, std::size_t frames, unsigned threads,
+  Arena(const ArenaOptions& options, std::vector<Stance> stances, unsigned threads,
         std::shared_ptr<const ArenaScene> scene)
       : options_(options),
         threads_(threads),
-        stances_(script_stances(options.script)),
+        stances_(std::move(stances)),
         cache_(options),
         scene_(std::move(scene)) {
-    if (frames > 0 && frames < stances_.size()) stances_.resize(frames);
     cairn::PinholeParameters camera;
     camera.fx = camera.fy = options.width / 2.0 / std::tan(options.field_of_view / 2 * degree);
     camera.cx = (options.width - 1) / 2.0;
@@ -142,7 +141,17 @@ private:
 std::unique_ptr<Dataset> open_arena(const ArenaOptions& options, std::size_t frames, unsigned threads,
                                     std::shared_ptr<const ArenaScene> scene) {
   check(options);
-  return std::make_unique<Arena>(options, frames, threads, std::move(scene));
+  std::vector<Stance> stances = script_stances(options.script);
+  if (frames > 0 && frames < stances.size()) stances.resize(frames);
+  return std::make_unique<Arena>(options, std::move(stances), threads, std::move(scene));
+}
+
+std::unique_ptr<Dataset> open_arena_views(const ArenaOptions& options, std::vector<Stance> stances,
+                                          unsigned threads) {
+  check(options);
+  ArenaOptions uncached = options;
+  uncached.cache = false;
+  return std::make_unique<Arena>(uncached, std::move(stances), threads, nullptr);
 }
 
 }  // namespace stereo_slam

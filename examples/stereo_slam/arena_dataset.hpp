@@ -7,8 +7,10 @@
 
 #include <cstddef>
 #include <memory>
+#include <vector>
 
 #include "arena_scene.hpp"
+#include "arena_script.hpp"
 #include "dataset.hpp"
 
 namespace stereo_slam {
@@ -19,5 +21,9 @@ namespace stereo_slam {
 [[nodiscard]] std::unique_ptr<Dataset> open_arena(const ArenaOptions& options, std::size_t frames,
                                                   unsigned threads,
                                                   std::shared_ptr<const ArenaScene> scene = nullptr);
+
+/// The arena of the options seen from other places than its script's; nothing is kept on disk.
+[[nodiscard]] std::unique_ptr<Dataset> open_arena_views(const ArenaOptions& options,
+                                                        std::vector<Stance> stances, unsigned threads);
 
 }  // namespace stereo_slam

@@ -27,6 +27,8 @@ public:
 
   LandmarkId add(const Look& look) override { return store_.add(look.descriptor, label_of(look.sign)); }
   void sighted(LandmarkId id) override { store_.sighted(id); }
+  void trust(LandmarkId id) override { store_.trust(id); }
+  bool is_base(LandmarkId id) const override { return store_.is_base(id); }
   void erase(LandmarkId id) override { static_cast<void>(store_.erase(id)); }
   std::vector<LandmarkId> advance() override { return store_.advance().expired; }
 

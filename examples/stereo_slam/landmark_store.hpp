@@ -50,6 +50,9 @@ public:
   /// A new landmark; it can be matched from the next step on.
   [[nodiscard]] virtual LandmarkId add(const Look& look) = 0;
   virtual void sighted(LandmarkId id) = 0;
+  /// A landmark of an earlier run: base from the next step on.
+  virtual void trust(LandmarkId id) = 0;
+  [[nodiscard]] virtual bool is_base(LandmarkId id) const = 0;
   /// Removes a landmark, where it is there.
   virtual void erase(LandmarkId id) = 0;
   /// Ends the step; returns the landmarks that ran out of time.

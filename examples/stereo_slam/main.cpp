@@ -36,7 +36,7 @@ struct Arguments {
   stereo_slam::DatasetOptions dataset;
   stereo_slam::PipelineOptions pipeline;
   std::filesystem::path out = "stereo_slam_out";
-  std::filesystem::path dump;
+  std::filesystem::path dump, map, save_map;
   std::string store = "multi";
   std::string features = "surf";
   std::string calibrate = "auto";
@@ -91,6 +91,12 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
       ->check(example::number_between(-5, 5))
       ->capture_default_str();
   app.add_flag("!--no-cache", arguments.dataset.arena.cache, "arena: do not keep rendered images on disk");
+  app.add_option("--save-map", arguments.save_map, "write the map for another run into FILE")
+      ->type_name("FILE");
+  CLI::Option* const map =
+      app.add_option("--map", arguments.map, "begin in the map of an earlier run and go on with it")
+          ->type_name("FILE");
+  app.add_flag("--localise", arguments.pipeline.localise, "leave that map as it is")->needs(map);
   app.add_option("--dump", arguments.dump, "write the frames as a KITTI odometry sequence into DIR and stop")
       ->type_name("DIR");
 }
@@ -107,7 +113,11 @@ struct Run {
 Run run(const stereo_slam::Dataset& dataset, const Arguments& arguments) {
   using Clock = std::chrono::steady_clock;
   Run result;
-  stereo_slam::Pipeline pipeline(dataset.rig(), arguments.pipeline);
+  stereo_slam::Pipeline pipeline =
+      arguments.map.empty()
+          ? stereo_slam::Pipeline(dataset.rig(), arguments.pipeline)
+          : stereo_slam::Pipeline(dataset.rig(), arguments.pipeline, stereo_slam::load_map(arguments.map),
+                                  arguments.map.string());
   example::Progress progress(std::cerr, "frames", dataset.size());
   const Clock::time_point start = Clock::now();
   const auto load = [&](std::size_t i) {
@@ -140,6 +150,8 @@ Run run(const stereo_slam::Dataset& dataset, const Arguments& arguments) {
     why = error.what();
     result.code = example::exit_data_ended;
   }
+  if (!arguments.save_map.empty() && progress.done() > 0)
+    stereo_slam::save_map(arguments.save_map, pipeline.map());
   stereo_slam::RunRecord& record = result.record = pipeline.record();
   if (!why.empty())
     record.ended_early = "ended after " + std::to_string(record.frames.size()) + " of " +

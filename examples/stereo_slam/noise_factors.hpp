@@ -24,6 +24,10 @@ namespace stereo_slam {
 /// where the viewpoint changes (by 2 % of the distance and more between keyframes).
 class NoiseFactors {
 public:
+  NoiseFactors() = default;
+  /// Goes on from factors that were found before.
+  NoiseFactors(double pixels, double poses) : pixels_(given * pixels), poses_(given * poses) {}
+
   /// Takes a frame; returns its median chi^2 over what it should be.
   double observe(const cairn::MapLocation& frame) {
     const double fit = frame.median_chi_squared / median_;

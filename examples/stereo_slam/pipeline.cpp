@@ -52,7 +52,6 @@ cairn::TriangulationOptions triangulation_options(const PipelineOptions& options
 cairn::KeyframeMapOptions map_options(const PipelineOptions& options) {
   cairn::KeyframeMapOptions map = options.map;
   map.min_matches = options.min_inliers;
-
   return map;
 }
 
@@ -74,6 +73,32 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options)
   record_.target_points = options.points;
   record_.features = feature_names[static_cast<std::size_t>(options.features)];
   record_.store = options.store.kind == StoreKind::multi ? "multi" : "single";
+}
+
+Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options, SavedMap known,
+                   const std::string& name)
+    : Pipeline(rig, options) {
+  expect_same_rig(known.map.nominal_rig(), rig, name);
+  if (known.features != options.features || known.oriented != options.oriented)
+    cairn::raise(name + ": the landmarks of this map are " + (known.oriented ? "oriented " : "") +
+                 feature_names[static_cast<std::size_t>(known.features)] + " points, this run looks for " +
+                 (options.oriented ? "oriented " : "") +
+                 feature_names[static_cast<std::size_t>(options.features)]);
+  if (options.calibrate == Calibration::drifting && known.map.rig_correction())
+    cairn::raise(name + ": this map estimates its rig, which cannot be followed as drifting besides");
+  map_ = std::move(known.map);
+  noise_factors_ = NoiseFactors(map_.pixel_factor(), map_.pose_factor());
+  step_ = known.steps;
+  for (Landmark& landmark : known.landmarks) {
+    landmark.id = store_->add({landmark.descriptor, landmark.sign});
+    store_->trust(landmark.id);
+    landmarks_.add(std::move(landmark));
+  }
+  static_cast<void>(store_->advance());
+  lost_ = true;
+  record_.calibration.on = map_.rig_correction().has_value();
+  record_.calibration.why = "as the map has it";
+  if (map_.rig_correction()) look_through(map_.rig());
 }
 
 const FrameRecord& Pipeline::step(const StereoFrame& frame, double load_milliseconds) {
@@ -99,7 +124,7 @@ const FrameRecord& Pipeline::work_on(const StereoFrame& frame, double load_milli
     else
       follow(frame, result);
   });
-  if (frame.truth) {
+  if (frame.truth && (T_truth_world_ || !lost_)) {
     if (!T_truth_world_) T_truth_world_ = *frame.truth * T_world_camera_.inverse();
     result.truth = T_truth_world_->inverse() * *frame.truth;
   }
@@ -157,13 +182,14 @@ void Pipeline::follow(const StereoFrame& frame, FrameRecord& result) {
   std::vector<Match> matches = timed(result, Stage::match, [&] { return match_with_map(); });
   const std::optional<Located> located = timed(result, Stage::pose, [&] { return locate(matches); });
   result.tracked = located.has_value();
+  result.relocalised = located && lost_;
   result.map_matches = static_cast<int>(matches.size());
   if (record_.frames.size() == options_.sample_frame + 1)
     keep_sample(frame, matches, located ? located->agreed : std::vector<Match>());
   if (!located) return lose(frame, matches.size());
   result.inliers = static_cast<int>(located->agreed.size());
   move_to(*located, result);
-  if (wants_keyframe(located->agreed.size()))
+  if (!options_.localise && wants_keyframe(located->agreed.size()))
     timed(result, Stage::update, [&] { make_keyframe(*located, frame, result); });
   timed(result, Stage::store, [&] { close_step(); });
   if (options_.calibrate == Calibration::drifting)
@@ -172,6 +198,7 @@ void Pipeline::follow(const StereoFrame& frame, FrameRecord& result) {
 
 void Pipeline::lose(const StereoFrame& frame, std::size_t matches) {
   T_last_camera_ = cairn::SE3();
+  lost_ = !map_.empty();
   record_.notes.push_back(frame.name + ": lost, " + std::to_string(matches) +
                           " matches with the map do not agree on a pose; the last pose is kept");
 }
@@ -221,9 +248,8 @@ std::vector<Pipeline::Match> Pipeline::match_with_map() const {
 /// RANSAC over the matches, a second look for landmarks that the pose says must be in view, and the last word
 /// to the joint covariance of the keyframes that all of them rest on.
 std::optional<Pipeline::Located> Pipeline::locate(std::vector<Match>& matches) {
-  const cairn::PosePrior prediction{predicted_pose()};
   const cairn::StereoPose pose =
-      cairn::estimate_stereo_pose(rig_, observations(matches), pose_options(), prediction);
+      cairn::estimate_stereo_pose(rig_, observations(matches), pose_options(), prediction());
   if (!pose.good()) return std::nullopt;
   look_again(pose, matches);
   Located located;
@@ -232,6 +258,7 @@ std::optional<Pipeline::Located> Pipeline::locate(std::vector<Match>& matches) {
   if (!located.location.good()) return std::nullopt;
   for (std::size_t i = 0; i < matches.size(); ++i)
     if (located.location.inliers[i] != 0) located.agreed.push_back(matches[i]);
+  if (lost_ && located.agreed.size() < options_.relocating_inliers) return std::nullopt;
   return located;
 }
 
@@ -269,7 +296,8 @@ void Pipeline::look_again(const cairn::StereoPose& pose, std::vector<Match>& mat
 
 void Pipeline::move_to(const Located& located, FrameRecord& result) {
   const cairn::MapLocation& here = located.location;
-  T_last_camera_ = T_world_camera_.inverse() * here.T_world_camera;
+  T_last_camera_ = lost_ ? cairn::SE3() : T_world_camera_.inverse() * here.T_world_camera;
+  lost_ = false;
   T_world_camera_ = here.T_world_camera;
   pose_covariance_ = here.covariance;
   result.fit = noise_factors_.observe(here);
@@ -404,8 +432,10 @@ std::vector<cairn::StereoSighting> Pipeline::sightings(std::span<const Match> ma
   return result;
 }
 
-cairn::SE3 Pipeline::predicted_pose() const {
-  return T_world_camera_ * T_last_camera_;
+/// Where the motion of the last step leads; of a camera that is lost nothing is known.
+std::optional<cairn::PosePrior> Pipeline::prediction() const {
+  if (lost_) return std::nullopt;
+  return cairn::PosePrior{T_world_camera_ * T_last_camera_};
 }
 
 cairn::StereoPoseOptions Pipeline::pose_options() const {
@@ -427,6 +457,17 @@ void Pipeline::keep_sample(const StereoFrame& frame, const std::vector<Match>& m
   for (const Match& match : matches) sample.points[match.local].kind = SamplePoint::Kind::matched;
   for (const Match& match : agreed) sample.points[match.local].kind = SamplePoint::Kind::inlier;
   record_.sample = std::move(sample);
+}
+
+SavedMap Pipeline::map() const {
+  SavedMap saved{options_.features, options_.oriented, step_, map_, {}};
+  for (const Landmark& landmark : landmarks_.all())
+    if (store_->is_base(landmark.id) && map_.contains(landmark.id))
+      saved.landmarks.push_back(landmark);
+    else
+      static_cast<void>(saved.map.forget(landmark.id));
+  std::ranges::sort(saved.landmarks, {}, &Landmark::id);
+  return saved;
 }
 
 RunRecord Pipeline::record() {

@@ -36,6 +36,7 @@
 #include "landmarks.hpp"
 #include "noise_factors.hpp"
 #include "run_record.hpp"
+#include "saved_map.hpp"
 #include "self_calibration.hpp"
 #include "stereo_matcher.hpp"
 #include "vertical_disparity.hpp"
@@ -71,6 +72,7 @@ struct PipelineOptions {
   double scale_exponent = 0.65;  ///< it grows with this power of the scale
   GuidedMatchingOptions second_look;
   std::size_t min_inliers = 10;          ///< fewer: the frame is lost
+  std::size_t relocating_inliers = 25;   ///< fewer: a camera that is lost stays so
   double max_depth_over_baseline = 150;  ///< farther points are too vague to keep
   /// A frame becomes a keyframe when the share of its points that the map knows falls below this part of what
   /// it was at best since the last one.
@@ -78,12 +80,18 @@ struct PipelineOptions {
   std::size_t max_landmarks = 40000;  ///< the least seen leave when there are more
   cairn::KeyframeMapOptions map;
   std::size_t sample_frame = 0;  ///< the frame shown with its matches in the report
+  bool localise = false;         ///< a loaded map stays as it is: no keyframe, no landmark more
 };
 
 /// The system. Feed it frames in order; then ask for the record.
 class Pipeline {
 public:
   Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options);
+  /// Goes on in a map of before, in its world; where the camera is in it shows with the first frame that
+  /// recognises enough. Its options of mapping are the map's. Throws cairn::Error for a map of another rig or
+  /// of other features; `name` is the map's.
+  Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options, SavedMap known,
+           const std::string& name);
 
   /// Works on one frame; `load_milliseconds` is what reading it took. Returns what came of it. Where that
   /// throws the record is of the frames before.
@@ -91,6 +99,9 @@ public:
 
   /// Everything that happened, with the map as it stands now.
   [[nodiscard]] RunRecord record();
+
+  /// The map as it stands now, for another run: without the landmarks that are on probation.
+  [[nodiscard]] SavedMap map() const;
 
 private:
   /// A point of the left image whose place is known in the camera's frame.
@@ -137,7 +148,7 @@ private:
   [[nodiscard]] std::vector<cairn::StereoMatch> observations(std::vector<Match>& matches);
   [[nodiscard]] std::vector<cairn::StereoSighting> sightings(std::span<const Match> matches) const;
   [[nodiscard]] cairn::StereoSighting sighting(std::uint32_t local, LandmarkId landmark) const;
-  [[nodiscard]] cairn::SE3 predicted_pose() const;
+  [[nodiscard]] std::optional<cairn::PosePrior> prediction() const;
   [[nodiscard]] cairn::StereoPoseOptions pose_options() const;
   void keep_sample(const StereoFrame& frame, const std::vector<Match>& matches,
                    const std::vector<Match>& agreed);
@@ -154,6 +165,7 @@ private:
   Landmarks landmarks_;
   cairn::KeyframeMap map_;
   NoiseFactors noise_factors_;
+  bool lost_ = false;      // where the camera is is not known from the frame before
   double best_share_ = 0;  // of a frame's points that the map knew, since the last keyframe
   std::vector<LocalLandmark> locals_;
   cairn::SE3 T_world_camera_;

@@ -31,6 +31,7 @@ struct FrameRecord {
   cairn::Matrix<6, 6> covariance;   ///< of the pose, tangent at the pose: translation, then rotation
   std::optional<cairn::SE3> truth;  ///< true T_world_camera in the same world, where the data has it
   bool tracked = false;
+  bool relocalised = false;  ///< tracked, though nothing was known of where the camera is
   int points_left = 0;
   int points_right = 0;
   int stereo_matches = 0;

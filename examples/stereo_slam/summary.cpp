@@ -184,7 +184,10 @@ Summary summarise(const RunRecord& run) {
   expect_frames(run);
   Summary summary;
   summary.frames = run.frames.size();
-  for (const FrameRecord& frame : run.frames) summary.frames_tracked += frame.tracked ? 1 : 0;
+  for (const FrameRecord& frame : run.frames) {
+    summary.frames_tracked += frame.tracked ? 1 : 0;
+    summary.relocalisations += frame.relocalised ? 1 : 0;
+  }
   summary.frames_lost = summary.frames - summary.frames_tracked;
   summary.points_left = median_over_frames(run, &FrameRecord::points_left);
   summary.stereo_matches = median_over_frames(run, &FrameRecord::stereo_matches);
@@ -206,6 +209,7 @@ std::string summary_json(const RunRecord& run, const Summary& summary) {
   json["frames"] = summary.frames;
   json["frames_tracked"] = summary.frames_tracked;
   json["frames_lost"] = summary.frames_lost;
+  json["relocalisations"] = summary.relocalisations;
   json["ended_early"] = run.ended_early ? Json(*run.ended_early) : Json(nullptr);
   json["points_left"] = number(summary.points_left);
   json["stereo_matches"] = number(summary.stereo_matches);

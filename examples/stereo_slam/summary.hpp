@@ -76,7 +76,8 @@ struct Summary {
   std::size_t frames = 0;
   std::size_t frames_tracked = 0;
   std::size_t frames_lost = 0;
-  double points_left = 0;  ///< median over frames, as the next three
+  std::size_t relocalisations = 0;  ///< how often it found itself in the map again
+  double points_left = 0;           ///< median over frames, as the next three
   double stereo_matches = 0;
   double map_matches = 0;
   double inliers = 0;

@@ -11,6 +11,7 @@
 #include <doctest/doctest.h>
 
 #include "arena_dataset.hpp"
+#include "saved_map.hpp"
 #include "support/data.hpp"
 #include "support/folder.hpp"
 
@@ -161,6 +162,66 @@ TEST_SUITE("pipeline") {
       CHECK_FALSE(frame.tracked);
       CHECK(frame.T_world_camera.matrix().allFinite());
     }
+  }
+
+  TEST_CASE("pipeline: finds itself in a map that was saved and loaded, which stays as it is when told so") {
+    stereo_slam::Pipeline mapping(rig(), options());
+    for (const StereoFrame& frame : drive()) mapping.step(frame);
+    const cairn_test::Folder folder;
+    stereo_slam::save_map(folder / "map", mapping.map());
+    const RunRecord made = mapping.record();
+
+    PipelineOptions with = options();
+    with.localise = true;
+    for (const std::size_t start : {std::size_t{12}, std::size_t{4}}) {
+      CAPTURE(start);
+      stereo_slam::Pipeline pipeline(rig(), with, stereo_slam::load_map(folder / "map"), "map");
+      CHECK_FALSE(pipeline.step(black(drive()[start])).tracked);
+      for (std::size_t i = start; i < drive().size(); ++i) {
+        const FrameRecord& frame = pipeline.step(drive()[i]);
+        REQUIRE(frame.tracked);
+        CHECK(frame.relocalised == (i == start));
+        const auto error = cairn::local(made.frames[i].T_world_camera, frame.T_world_camera);
+        CHECK(error.head<3>().norm() < 0.01);
+        CHECK(error.tail<3>().norm() < 0.003);
+      }
+      const stereo_slam::SavedMap before = stereo_slam::load_map(folder / "map"), after = pipeline.map();
+      CHECK(after.map.keyframe_count() == before.map.keyframe_count());
+      CHECK(after.map.landmark_ids() == before.map.landmark_ids());
+    }
+    stereo_slam::Pipeline going_on(rig(), options(), stereo_slam::load_map(folder / "map"), "map");
+    for (const StereoFrame& frame : drive()) CHECK(going_on.step(frame).tracked);
+    CHECK(going_on.map().steps == 2 * static_cast<int>(drive().size()));
+  }
+
+  TEST_CASE("pipeline: a map of another rig, or of other points, is refused in words") {
+    stereo_slam::Pipeline mapping(rig(), options());
+    mapping.step(drive()[0]);
+    cairn::StereoRig other = rig();
+    other.T_left_right = cairn::SE3({}, cairn::Vector<3>(0.21, 0, 0));
+    CHECK_THROWS_WITH_AS(stereo_slam::Pipeline(other, options(), mapping.map(), "old.map"),
+                         doctest::Contains("old.map: this map was made with another rig"), cairn::Error);
+    PipelineOptions oriented = options();
+    oriented.oriented = true;
+    CHECK_THROWS_WITH_AS(
+        stereo_slam::Pipeline(rig(), oriented, mapping.map(), "old.map"),
+        "old.map: the landmarks of this map are surf points, this run looks for oriented surf", cairn::Error);
+  }
+
+  TEST_CASE("pipeline: a camera that is in another place than its map knows stays lost") {
+    stereo_slam::Pipeline mapping(rig(), options());
+    for (const StereoFrame& frame : drive()) mapping.step(frame);
+    stereo_slam::ArenaOptions elsewhere;
+    elsewhere.script = "loop";
+    elsewhere.seed = 77;
+    elsewhere.width = 384;
+    elsewhere.height = 288;
+    elsewhere.cache = false;
+    PipelineOptions with = options();
+    with.localise = true;
+    stereo_slam::Pipeline pipeline(rig(), with, mapping.map(), "map");
+    CHECK_FALSE(pipeline.step(stereo_slam::open_arena(elsewhere, 1, 2)->frame(0)).tracked);
+    CHECK(pipeline.record().frames[0].covariance.isZero());
   }
 }
 

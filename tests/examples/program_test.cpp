@@ -128,6 +128,27 @@ TEST_SUITE("program") {
     }
   }
 
+  TEST_CASE("stereo_slam: a run goes on in the map of another, and what is no map is refused before work") {
+    const cairn_test::Folder folder;
+    const auto named = [&](const char* name) { return "\"" + (folder / name).string() + "\""; };
+    REQUIRE(run("--frames 4 --save-map " + named("map") + " --out " + named("first")).code == 0);
+    REQUIRE(run("--frames 4 --map " + named("map") + " --localise --save-map " + named("same") + " --out " +
+                named("second"))
+                .code == 0);
+    CHECK(summary_in(folder / "second")["relocalisations"] == 1);
+    CHECK(summary_in(folder / "second")["frames_lost"] == 0);
+    CHECK(summary_in(folder / "second")["keyframes"] == summary_in(folder / "first")["keyframes"]);
+    CHECK(names_in(folder / "second") == results());
+    CHECK(run("--localise --out " + named("third")).code == 2);
+    tear(folder / "map");
+    for (const char* bad : {"map", "none"}) {
+      const Outcome outcome = run("--frames 4 --map " + named(bad) + " --out " + named("third"));
+      CHECK(outcome.code == 2);
+      CHECK(outcome.says((folder / bad).string() + ": "));
+    }
+    CHECK_FALSE(fs::exists(folder / "third" / "summary.json"));
+  }
+
   TEST_CASE("stereo_slam: where the first image is torn there is nothing to write, and old results stay") {
     const cairn_test::Folder folder;
     make_drive(folder, 3);

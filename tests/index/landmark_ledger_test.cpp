@@ -65,6 +65,18 @@ TEST_SUITE("landmark_ledger") {
     CHECK(ledger.probation_size() == 0);
   }
 
+  TEST_CASE("landmark_ledger: one that is trusted is base from the next step on") {
+    LandmarkLedger ledger({.base_seen_times = 3, .max_nonbase_time = 7});
+    const LandmarkId trusted = ledger.add(), other = ledger.add();
+    ledger.trust(trusted);
+    CHECK_FALSE(ledger.is_base(trusted));
+    CHECK(ledger.advance().promoted == std::vector<LandmarkId>{trusted});
+    CHECK(ledger.is_base(trusted));
+    CHECK_FALSE(ledger.is_base(other));
+    CHECK(ledger.base_size() == 1);
+    CHECK(ledger.probation_size() == 1);
+  }
+
   TEST_CASE("landmark_ledger: a landmark expires more than its time after it was first seen, not at it") {
     LandmarkLedger ledger({.base_seen_times = 3, .max_nonbase_time = 4});
     const LandmarkId id = ledger.add();

@@ -82,6 +82,12 @@ public:
     ++record.sightings;
   }
 
+  /// The landmark earned its trust elsewhere, in an earlier run say: it is base from the next step on.
+  void trust(LandmarkId id) {
+    CAIRN_EXPECTS(contains(id), "LandmarkLedger::trust: no such landmark");
+    records_[id].sightings = std::max(records_[id].sightings, probation_.base_seen_times);
+  }
+
   /// Removes a landmark; false where there is none of that id.
   bool erase(LandmarkId id) {
     if (!contains(id)) return false;

@@ -127,6 +127,9 @@ public:
   /// The landmark was seen in this step (add() counts as a sighting).
   void sighted(LandmarkId id) { ledger_.sighted(id); }
 
+  /// The landmark earned its trust elsewhere, in an earlier run say: it is base from the next step on.
+  void trust(LandmarkId id) { ledger_.trust(id); }
+
   /// Removes a landmark at once; false where there is none of that id.
   bool erase(LandmarkId id) {
     if (!ledger_.contains(id)) return false;

@@ -211,6 +211,7 @@ public:
     pixel_factor_ = pixels;
     pose_factor_ = poses;
   }
+  [[nodiscard]] double pixel_factor() const noexcept { return pixel_factor_; }
   [[nodiscard]] double pose_factor() const noexcept { return pose_factor_; }
 
   /// Another calibration, from outside: landmarks will be where their lists say under it. Not where the map

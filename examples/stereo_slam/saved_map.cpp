@@ -1,0 +1,87 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "saved_map.hpp"
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+
+#include <cairn/core/check.hpp>
+#include <cairn/io/binary_file.hpp>
+#include <cairn/io/file.hpp>
+#include <cairn/slam/keyframe_map_file.hpp>
+
+namespace stereo_slam {
+namespace {
+
+constexpr const char* kind = "cairnmap";
+constexpr std::uint64_t version = 1;
+
+void put(cairn::BinaryWriter& out, const Landmark& landmark) {
+  out.put(landmark.sign);
+  out.put(landmark.grey);
+  for (const int number : {landmark.first_seen, landmark.last_seen, landmark.sightings}) out.put(number);
+  for (const float number : landmark.descriptor) out.put(number);
+}
+
+Landmark get_landmark(cairn::BinaryReader& in, LandmarkId id, int dimension) {
+  Landmark landmark;
+  landmark.id = id;
+  landmark.sign = in.get<std::int8_t>();
+  landmark.grey = in.get<std::uint8_t>();
+  for (int* number : {&landmark.first_seen, &landmark.last_seen, &landmark.sightings})
+    *number = in.get<int>();
+  for (int i = 0; i < dimension; ++i) {
+    landmark.descriptor.push_back(in.get<float>());
+    if (!std::isfinite(landmark.descriptor.back())) cairn::raise(in.name() + ": a descriptor is not finite");
+  }
+  return landmark;
+}
+
+bool same(const cairn::PinholeCamera& a, const cairn::PinholeCamera& b) {
+  const cairn::PinholeParameters &p = a.parameters(), &q = b.parameters();
+  return p.fx == q.fx && p.fy == q.fy && p.cx == q.cx && p.cy == q.cy && p.k1 == q.k1 && p.k2 == q.k2 &&
+         p.p1 == q.p1 && p.p2 == q.p2 && p.k3 == q.k3 && p.width == q.width && p.height == q.height;
+}
+
+}  // namespace
+
+void save_map(const std::filesystem::path& path, const SavedMap& saved) {
+  cairn::BinaryWriter out;
+  out.put(static_cast<std::uint8_t>(saved.features));
+  out.put(static_cast<std::uint8_t>(saved.oriented));
+  out.put(saved.steps);
+  cairn::save_keyframe_map(out, saved.map);
+  for (const Landmark& landmark : saved.landmarks) put(out, landmark);
+  cairn::write_file_atomically(path, out.file(kind, version));
+}
+
+SavedMap load_map(const std::filesystem::path& path) {
+  const std::string bytes = cairn::read_file(path);
+  cairn::BinaryReader in(bytes, kind, version, path.string());
+  const auto features = in.get<std::uint8_t>();
+  if (features >= feature_names.size()) cairn::raise(path.string() + ": the kind of features is unknown");
+  const bool oriented = in.get<std::uint8_t>() != 0;
+  const int steps = in.get<int>();
+  SavedMap saved{static_cast<FeatureKind>(features), oriented, steps, cairn::load_keyframe_map(in), {}};
+  const std::size_t count = saved.map.landmark_count();
+  for (std::size_t i = 0; i < count; ++i)
+    saved.landmarks.push_back(get_landmark(in, static_cast<LandmarkId>(i), dimension_of(saved.features)));
+  in.expect_end();
+  return saved;
+}
+
+void expect_same_rig(const cairn::StereoRig& of_map, const cairn::StereoRig& rig, const std::string& name) {
+  const cairn::Vector<6> apart = cairn::local(of_map.T_left_right, rig.T_left_right);
+  if (same(of_map.left, rig.left) && same(of_map.right, rig.right) && apart.norm() < 1e-9) return;
+  cairn::raise(name + ": this map was made with another rig than these images (" +
+               std::to_string(of_map.left.width()) + " x " + std::to_string(of_map.left.height()) +
+               " pixels, focal length " + std::to_string(of_map.left.fx()) + ", baseline " +
+               std::to_string(of_map.baseline()) + " m; here " + std::to_string(rig.left.width()) + " x " +
+               std::to_string(rig.left.height()) + ", " + std::to_string(rig.left.fx()) + ", " +
+               std::to_string(rig.baseline()) + " m)");
+}
+
+}  // namespace stereo_slam
