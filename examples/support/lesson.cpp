@@ -80,6 +80,12 @@ std::string as_csv(const std::vector<std::string>& columns, const std::vector<st
 
 }  // namespace
 
+std::vector<double> column(const std::vector<std::vector<double>>& rows, std::size_t index) {
+  std::vector<double> values;
+  for (const std::vector<double>& row : rows) values.push_back(row.at(index));
+  return values;
+}
+
 Lesson::Lesson(LessonInfo info, int argc, char** argv)
     : info_(std::move(info)),
       steps_(info_.steps),

@@ -26,6 +26,8 @@
 #include <utility>
 #include <vector>
 
+#include <cairn/core/statistics.hpp>
+
 #include "support/report.hpp"
 
 namespace example {
@@ -46,6 +48,9 @@ struct LessonInfo {
   std::vector<Mistake> mistakes = {};
 };
 
+/// One column of a table that was kept row by row.
+[[nodiscard]] std::vector<double> column(const std::vector<std::vector<double>>& rows, std::size_t index);
+
 class Lesson {
 public:
   /// Parses --seed, --steps, --out, --mistake, --quiet, --about, --help and --version. Ends the program where
@@ -65,6 +70,11 @@ public:
   /// Judges a number: right from `low` to `high`, both included, and wrong otherwise, as NaN is. Printed, and
   /// a key figure of the page.
   void verdict(const std::string& name, double value, double low, double high, const std::string& hint = {});
+
+  void verdict(const std::string& name, double value, const cairn::ConsistencyBand& band,
+               const std::string& hint = {}) {
+    verdict(name, value, band.low, band.high, hint);
+  }
 
   /// A number of the page without a verdict.
   void figure(KeyFigure figure) { report_.figure(std::move(figure)); }

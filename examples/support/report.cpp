@@ -192,6 +192,7 @@ void Report::add(const LinePlot& panel) {
     json["curves"].push_back({{"name", curve.name},
                               {"ink", name_of(curve.ink)},
                               {"dashed", curve.dashed},
+                              {"dots", curve.dots},
                               {"values", rounded_all(curve.values)}});
   }
   json["bands"] = Json::array();

@@ -49,6 +49,7 @@ struct Curve {
   Ink ink = Ink::belief;
   std::vector<double> values = {};  ///< one for each x value
   bool dashed = false;
+  bool dots = false;  ///< single ones, such as readings, without a line between them
 };
 
 /// The room between two curves over the common x values of a LinePlot, such as a mean and two standard
