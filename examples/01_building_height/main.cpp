@@ -75,7 +75,7 @@ int main(int argc, char** argv) {
   const std::vector<double> readings{48.54, 47.11, 55.01, 55.15, 49.89, 40.85, 46.72, 50.05, 51.27, 49.95};
   Belief belief{Height(guess), cairn::Matrix<1>(guess_variance)};
   double sum = 0, mean = 0;
-  std::vector<std::vector<double>> table;
+  example::Rows table;
   for (const double z : readings) {
     const auto n = static_cast<double>(table.size() + 1);
     const double k = take_in(belief, z), x = belief.mean(0), deviation = std::sqrt(belief.covariance(0, 0));

@@ -48,8 +48,9 @@ struct LessonInfo {
   std::vector<Mistake> mistakes = {};
 };
 
-/// One column of a table that was kept row by row.
-[[nodiscard]] std::vector<double> column(const std::vector<std::vector<double>>& rows, std::size_t index);
+/// A table that is kept row by row, and one of its columns.
+using Rows = std::vector<std::vector<double>>;
+[[nodiscard]] std::vector<double> column(const Rows& rows, std::size_t index);
 
 class Lesson {
 public:
@@ -87,8 +88,7 @@ public:
 
   /// The file NAME.csv among the results. Throws cairn::Error where a row has another number of values than
   /// there are columns.
-  void csv(const std::string& name, const std::vector<std::string>& columns,
-           const std::vector<std::vector<double>>& rows);
+  void csv(const std::string& name, const std::vector<std::string>& columns, const Rows& rows);
 
   /// Writes page and tables, prints "verdict: green" or "verdict: RED (names)", and returns the exit code. A
   /// lesson without a verdict is red.
