@@ -2,24 +2,23 @@
 // SPDX-License-Identifier: MIT
 //
 // 02 Falling ball: how to choose Q.
-// STORY  A ball is dropped from a balloon, 500 m up. A radar tells its height, 0.5 m off or so, at odd
-// moments: the next reading comes 0.02 s later, or 0.3 s. Gusts change the ball's acceleration, nobody knows
-// how. How much of that the filter expects is its Q, the matrix that everybody tunes until the curve looks
-// nice.
 //
-//   x   height, velocity, acceleration    [m, m/s, m/s^2]      dt  time since the last reading           [s]
-//   P   covariance of the belief in x                          z   a reading of the height               [m]
-//   q   density of the gusts' jerk        [(m/s^3)^2 s]        S   variance of z that the filter expects
-//   [m^2]
+// STORY  A ball is dropped from a balloon. A radar tells its height, 0.5 m off or so, at odd moments. Gusts
+// change the ball's acceleration, nobody knows how. How much of that a filter expects is its Q, which is
+// mostly tuned until a curve looks nice.
+//
+//   x   height, velocity, acceleration   [m, m/s, m/s^2]    dt  time since the last reading            [s]
+//   P   covariance of the belief in x                       z   a reading of the height, h as believed [m]
+//   q   density of the gusts' jerk       [(m/s^3)^2 s]      S   variance of z, as the filter expects [m^2]
 //
 // EQUATIONS (Bar-Shalom, Li, Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001)
-//   x <- F x,  P <- F P F' + Q,   F = [1 dt dt^2/2; 0 1 dt; 0 0 1]                       (section 6.2.3)
+//   x <- F x,  P <- F P F' + Q,   F = [1 dt dt^2/2; 0 1 dt; 0 0 1]                        (section 6.2.3)
 //   Q = q [dt^5/20 dt^4/8 dt^3/6; dt^4/8 dt^3/3 dt^2/2; dt^3/6 dt^2/2 dt]
-//   NIS  = (z - h)^2 / S                   surprise over expected surprise; its mean is 1      (section 5.4)
+//   NIS  = (z - h)^2 / S                   surprise over expected surprise; its mean is 1   (section 5.4)
 //   NEES = (x - truth)' P^-1 (x - truth)   error over expected error; its mean is 3, for 3 numbers
+//
 // LOOK AT  the film while you move q: too small, and the truth leaves the narrow band; too large, and it
-// rattles about in a wide one. Then the plot below: within a factor of three the error hardly changes, and no
-// eye can tell which q is right. NIS can, and needs no truth for it.
+// rattles in a wide one. Then the plot: around q the error hardly changes; NIS does, and needs no truth.
 //
 // CHANGE THIS (answers at the end of the file)
 //   1. Tell the filter that the radar's sigma is 1 m, while it stays 0.5 m. Where does NIS cross 1 now?
