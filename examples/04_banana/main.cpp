@@ -18,7 +18,6 @@
 // exact moments are those of the cosine and the sine of a normal angle.)
 // LOOK AT  the film while the compass gets worse. The extended filter's ellipse grows sideways only: a line
 // does not know that turning either way leads south. The unscented one has the right size and place.
-//
 // CHANGE THIS (answers at the end of the file)
 //   1. Give Unscented alpha = 1e-3, beta = 2, kappa = 0, as many do. What becomes of yy?
 //   2. How many particles (--steps) give mean y as well as the nine points of the unscented filter?
