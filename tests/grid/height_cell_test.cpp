@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -12,6 +13,7 @@
 #include <cairn/core/random.hpp>
 #include <cairn/grid/height_cell.hpp>
 
+#include "support/folder.hpp"
 #include "support/random.hpp"
 
 namespace height_cell_test {
@@ -92,10 +94,11 @@ double kept_mean(const HeightPrior& prior, const Visits& visits) {
 /// The evidence of visits, one after the other.
 template <class Cell>
 double log_evidence_of(const HeightPrior& prior, const Visits& visits, Cell* last = nullptr) {
+  const HeightModel model(prior);
   Cell cell;
   double sum = 0;
   for (const auto& heights : visits) {
-    sum += cell.log_evidence(sums_of(heights), prior);
+    sum += cell.log_evidence(sums_of(heights), model);
     cell.insert(sums_of(heights));
   }
   if (last != nullptr) *last = cell;
@@ -163,6 +166,15 @@ TEST_SUITE("grid/height_cell") {
     CHECK(std::abs(log_evidence_of<VarianceCell>(prior, {heights})) > 1);
   }
 
+  TEST_CASE("height_cell: counts of wholes, of fractions and beyond the table go on from each other") {
+    const HeightModel model({1.5, 0.1, 0.01, 0});
+    for (const double n : {1.0, 7.0, 4094.0, 4095.0, 5000.0}) {
+      const auto evidence = [&](double seen) { return model.log_spread_evidence(seen, 3, 2.0, 0.1); };
+      const double here = evidence(n), beside = evidence(n + 1e-7);
+      CHECK(here == doctest::Approx(beside).epsilon(1e-6));
+    }
+  }
+
   TEST_CASE("height_cell: sums put together are the sums of all, and of nothing nothing") {
     Random random(3);
     std::vector<double> all;
@@ -181,8 +193,8 @@ TEST_SUITE("grid/height_cell") {
     CHECK(together.count == static_cast<double>(all.size()));
     CHECK(together.mean == doctest::Approx(mean).epsilon(1e-14));
     CHECK(together.squares == doctest::Approx(squares).epsilon(1e-8));
-    CHECK(HeightCell{}.log_evidence(HeightSums{}, {}) == 0);
-    CHECK(VarianceCell{}.log_evidence(HeightSums{}, {}) == 0);
+    CHECK(HeightCell{}.log_evidence(HeightSums{}, HeightModel()) == 0);
+    CHECK(VarianceCell{}.log_evidence(HeightSums{}, HeightModel()) == 0);
   }
 
   TEST_CASE("height_cell: intervals of sigma hold the sigma that was drawn as often as they say") {
@@ -221,6 +233,7 @@ TEST_SUITE("grid/height_cell") {
     CHECK_FALSE(HeightPrior{.sigma = NAN}.valid());
     CHECK_FALSE(HeightPrior{.kappa = 0}.valid());
     CHECK_FALSE(HeightPrior{.mean = INFINITY}.valid());
+    CHECK(cairn_test::message_of([] { HeightModel({.sigma = 0}); }).find("above zero") != std::string::npos);
   }
 }
 

@@ -29,6 +29,7 @@
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/parallel.hpp>
 #include <cairn/core/random.hpp>
+#include <cairn/core/statistics.hpp>
 #include <cairn/filter/detail/path_tree.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/particle.hpp>
@@ -89,15 +90,32 @@ struct RegimeMotion {
   std::vector<Mode> modes;
 };
 
-/// Poses drawn from the motion and weighed by the likelihood: the bootstrap filter.
+/// Poses drawn from the motion and weighed by the likelihood: the bootstrap filter. Of several draws a
+/// particle keeps one by its likelihood, and weighs their mean: as unbiased as one draw, and steadier.
 struct FromMotion {
+  std::size_t draws = 1;  ///< at least 1
+
   template <ConditionalMap M>
   [[nodiscard]] Proposed<typename M::Pose> operator()(const M& map, const Gaussian<typename M::Pose>& motion,
                                                       const typename M::Observation& z,
                                                       Random& random) const {
-    typename M::Pose pose = sample(motion, random);
-    const double log_likelihood = map.log_likelihood(pose, z);
-    return {std::move(pose), motion, log_likelihood, log_likelihood, 0};
+    CAIRN_EXPECTS(draws > 0, "FromMotion needs at least one draw");
+    std::vector<typename M::Pose> poses;
+    std::vector<double> log_likelihoods;
+    for (std::size_t k = 0; k < draws; ++k) {
+      poses.push_back(sample(motion, random));
+      log_likelihoods.push_back(map.log_likelihood(poses.back(), z));
+    }
+    if (draws == 1) return {std::move(poses[0]), motion, log_likelihoods[0], log_likelihoods[0], 0};
+    const double total = log_sum_exp(log_likelihoods);
+    std::size_t chosen = 0;
+    for (double left = random.uniform(); chosen + 1 < draws; ++chosen) {
+      const double share = std::exp(log_likelihoods[chosen] - total);
+      if (!(left >= share)) break;  // also where no draw has a likelihood
+      left -= share;
+    }
+    return {std::move(poses[chosen]), motion, total - std::log(static_cast<double>(draws)),
+            log_likelihoods[chosen], 0};
   }
   /// The regime is drawn by its share first.
   template <ConditionalMap M>

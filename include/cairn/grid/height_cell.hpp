@@ -13,11 +13,16 @@
 ///   HeightCell    m is kept, N(m0, 1 / (kappa0 tau)): normal-gamma (M. DeGroot, "Optimal Statistical
 ///                 Decisions", 1970, sec. 9.6); a proper density of all heights, in whatever visits they come
 /// A cell holds sums only; the prior comes with each question, so that a cell nobody wrote is the prior.
+/// Questions cost O(1), a few logarithms.
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <limits>
+#include <memory>
 #include <numbers>
+#include <utility>
+#include <vector>
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/statistics.hpp>
@@ -76,17 +81,41 @@ struct HeightSpread {
   }
 };
 
-namespace detail {
+/// A prior that is ready to be asked for many cells' evidence. Copies share a table of 32 KB.
+class HeightModel {
+public:
+  /// Throws Error where the prior is out of its ranges.
+  explicit HeightModel(const HeightPrior& prior = {}) : prior_(prior) {
+    if (!prior.valid()) raise("HeightModel: expected nu, sigma and kappa above zero, and a finite mean");
+    std::vector<double> table(4096);
+    for (std::size_t n = 0; n < table.size(); ++n)
+      table[n] = cairn::log_gamma(0.5 * (prior.nu + static_cast<double>(n)));
+    table_ = std::make_shared<const std::vector<double>>(std::move(table));
+  }
 
-/// log of the part of the evidence that comes from the spread: Gamma((nu+n)/2) / Gamma(nu/2) S^(nu/2) /
-/// (S + added)^((nu+n)/2) / pi^(n/2).
-[[nodiscard]] inline double log_spread_evidence(const HeightSpread& before, double n, double added) noexcept {
-  const double after = before.squares + added;
-  return log_gamma(0.5 * (before.nu + n)) - log_gamma(0.5 * before.nu) -
-         0.5 * before.nu * std::log1p(added / before.squares) - 0.5 * n * std::log(std::numbers::pi * after);
-}
+  [[nodiscard]] const HeightPrior& prior() const noexcept { return prior_; }
 
-}  // namespace detail
+  /// log of what the spread contributes to the evidence of n more heights, of which `seen` are known already,
+  /// and which raise the squares from `before` by `added`: Gamma((nu + seen + n)/2) / Gamma((nu + seen)/2)
+  /// before^((nu + seen)/2) / (before + added)^((nu + seen + n)/2) / pi^(n/2).
+  [[nodiscard]] double log_spread_evidence(double seen, double n, double before,
+                                           double added) const noexcept {
+    return log_gamma_of(seen + n) - log_gamma_of(seen) -
+           0.5 * (prior_.nu + seen) * std::log1p(added / before) -
+           0.5 * n * std::log(std::numbers::pi * (before + added));
+  }
+
+private:
+  /// Of (nu + count) / 2: from the table where heights count as wholes.
+  [[nodiscard]] double log_gamma_of(double count) const noexcept {
+    if (!(count < static_cast<double>(table_->size()))) return log_gamma(0.5 * (prior_.nu + count));
+    const auto whole = static_cast<std::size_t>(count);
+    return static_cast<double>(whole) == count ? (*table_)[whole] : log_gamma(0.5 * (prior_.nu + count));
+  }
+
+  HeightPrior prior_;
+  std::shared_ptr<const std::vector<double>> table_;
+};
 
 /// The spread of a cell whose mean nobody keeps.
 struct VarianceCell {
@@ -98,9 +127,10 @@ struct VarianceCell {
     return {prior.nu + nu, prior.squares() + squares};
   }
   /// log density of the heights of one visit but for their mean, 0 where there are fewer than two.
-  [[nodiscard]] double log_evidence(const HeightSums& visit, const HeightPrior& prior) const noexcept {
+  [[nodiscard]] double log_evidence(const HeightSums& visit, const HeightModel& model) const noexcept {
     if (!(visit.count > 1)) return 0;
-    return detail::log_spread_evidence(spread(prior), visit.count - 1, visit.squares) -
+    const double before = spread(model.prior()).squares;
+    return model.log_spread_evidence(nu, visit.count - 1, before, visit.squares) -
            0.5 * std::log(visit.count);
   }
   void insert(const HeightSums& visit) noexcept {
@@ -126,11 +156,13 @@ struct HeightCell {
             prior.squares() + seen.squares + away * away * (prior.kappa * seen.count / kappa(prior))};
   }
   /// log density of the heights of one visit.
-  [[nodiscard]] double log_evidence(const HeightSums& visit, const HeightPrior& prior) const noexcept {
+  [[nodiscard]] double log_evidence(const HeightSums& visit, const HeightModel& model) const noexcept {
     if (!(visit.count > 0)) return 0;
+    const HeightPrior& prior = model.prior();
     const double before = kappa(prior), after = before + visit.count, away = visit.mean - mean(prior);
     const double added = visit.squares + away * away * (before * visit.count / after);
-    return detail::log_spread_evidence(spread(prior), visit.count, added) + 0.5 * std::log(before / after);
+    return model.log_spread_evidence(seen.count, visit.count, spread(prior).squares, added) +
+           0.5 * std::log(before / after);
   }
   void insert(const HeightSums& visit) noexcept { seen.add(visit); }
   friend bool operator==(const HeightCell&, const HeightCell&) = default;
