@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include <cairn/core/check.hpp>
 #include <cairn/grid/height_cell.hpp>
 #include <cairn/grid/shared_tiles.hpp>
 #include <cairn/grid/tile.hpp>
@@ -32,7 +33,7 @@ struct ElevationOptions {
   cairn::HeightPrior prior{};
   /// Evidence of a scan counts for this share of itself: its points err together, by pitch, roll and
   /// matching.
-  double independence = 0.05;
+  double independence = 0.01;
   /// A height counts for this share of one in a cell: scans of one pass see the same stones.
   double heights_share = 0.2;
   double altitude_sigma = 0.02;  ///< of a cell's mean by what all its points have in common [m]
@@ -51,6 +52,8 @@ public:
       cairn::raise("ElevationMap: expected a cell size above zero");
     if (!(options.independence > 0 && options.independence <= 1))
       cairn::raise("ElevationMap: expected an independence above 0 and up to 1");
+    if (!(options.heights_share > 0 && options.heights_share <= 1))
+      cairn::raise("ElevationMap: expected a share of heights above 0 and up to 1");
   }
 
   [[nodiscard]] const ElevationOptions& options() const noexcept { return options_; }
@@ -72,11 +75,7 @@ public:
     altitude_ = altitude.value;
     variance_ = altitude.variance;
     lift(visits, altitude_);
-    for (Visit& visit : visits) {
-      visit.heights.count *= options_.heights_share;
-      visit.heights.squares *= options_.heights_share;
-      cells_.write(visit.cell).insert(visit.heights);
-    }
+    for (const Visit& visit : visits) cells_.write(visit.cell).insert(visit.heights, options_.heights_share);
   }
 
 private:

@@ -85,7 +85,9 @@ void map_drive(Results& r, const Drive& drive, const std::function<std::optional
   for (const TerrainScan& scan : drive.scans) {
     const Matrix<3> noise = motion_noise(scan, r.scans == 0, options);
     const auto motion = [&](const SE2& x, std::size_t) { return Gaussian<SE2>{x * scan.moved, noise}; };
-    const cairn::MappingStep step = filter.step(belief, motion, cairn::FromMotion{}, scan);
+    const bool wide = noise(2, 2) > options.wide_turn * options.wide_turn;
+    const cairn::FromMotion proposal{.draws = wide ? options.draws : 1};
+    const cairn::MappingStep step = filter.step(belief, motion, proposal, scan);
     if (!step.accepted())
       cairn::raise("gamma_slam: scan " + std::to_string(r.scans) + ": " + cairn::explain(step.status));
     r.resampled += step.resampled;
@@ -129,7 +131,8 @@ double Results::mean_error(const std::vector<SE2>& poses) const {
 
 Results run(const Drive& drive, const RunOptions& options,
             const std::function<std::optional<std::string>()>& on_scan) {
-  if (options.particles == 0) cairn::raise("gamma_slam: expected at least one particle");
+  if (options.particles == 0 || options.draws == 0)
+    cairn::raise("gamma_slam: expected at least one particle and one draw");
   Results r;
   r.options = options;
   const auto begin = std::chrono::steady_clock::now();

@@ -32,6 +32,9 @@ struct RunOptions {
   /// What odometry's own covariance does not hold: errors that all matches of a look have in common.
   double per_metre = 0.005;    ///< [m] to either side
   double turn_sigma = 0.0013;  ///< [rad] a step
+  /// Poses that a particle draws where odometry says little of the turn; 1 elsewhere.
+  std::size_t draws = 8;
+  double wide_turn = 0.003;  ///< [rad] from which on that is so
   double resample_below = 0.5;
 };
 

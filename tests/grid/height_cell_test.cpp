@@ -175,6 +175,24 @@ TEST_SUITE("grid/height_cell") {
     }
   }
 
+  TEST_CASE("height_cell: four visits of which each height is worth a quarter are one visit") {
+    HeightSums visit;
+    for (const double h : {0.3, 0.5, 0.35, 0.42}) visit.add(h);
+    HeightCell whole, shared;
+    VarianceCell whole_variance, shared_variance;
+    whole.insert(visit);
+    whole_variance.insert(visit);
+    for (int k = 0; k < 4; ++k) {
+      shared.insert(visit, 0.25);
+      shared_variance.insert(visit, 0.25);
+    }
+    CHECK(shared.seen.count == whole.seen.count);
+    CHECK(shared.seen.mean == doctest::Approx(whole.seen.mean).epsilon(1e-14));
+    CHECK(shared.seen.squares == doctest::Approx(whole.seen.squares).epsilon(1e-13));
+    CHECK(shared_variance.nu == whole_variance.nu);
+    CHECK(shared_variance.squares == doctest::Approx(whole_variance.squares).epsilon(1e-14));
+  }
+
   TEST_CASE("height_cell: sums put together are the sums of all, and of nothing nothing") {
     Random random(3);
     std::vector<double> all;

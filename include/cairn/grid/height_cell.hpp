@@ -133,10 +133,11 @@ struct VarianceCell {
     return model.log_spread_evidence(nu, visit.count - 1, before, visit.squares) -
            0.5 * std::log(visit.count);
   }
-  void insert(const HeightSums& visit) noexcept {
+  /// Takes a visit in; with a share below 1 each height is worth so much of one.
+  void insert(const HeightSums& visit, double share = 1) noexcept {
     if (!(visit.count > 1)) return;
-    nu += visit.count - 1;
-    squares += visit.squares;
+    nu += share * (visit.count - 1);
+    squares += share * visit.squares;
   }
   friend bool operator==(const VarianceCell&, const VarianceCell&) = default;
 };
@@ -164,7 +165,10 @@ struct HeightCell {
     return model.log_spread_evidence(seen.count, visit.count, spread(prior).squares, added) +
            0.5 * std::log(before / after);
   }
-  void insert(const HeightSums& visit) noexcept { seen.add(visit); }
+  /// Takes a visit in; with a share below 1 each height is worth so much of one.
+  void insert(const HeightSums& visit, double share = 1) noexcept {
+    seen.add({share * visit.count, visit.mean, share * visit.squares});
+  }
   friend bool operator==(const HeightCell&, const HeightCell&) = default;
 };
 
