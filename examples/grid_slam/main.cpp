@@ -11,9 +11,11 @@
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
+#include <cairn/core/check.hpp>
 #include <cairn/eval/relations.hpp>
 #include <cairn/io/carmen.hpp>
 
@@ -33,8 +35,12 @@ struct Options {
   std::string log, relations;
   bool simulate = false;
   std::filesystem::path out = "grid_slam_out";
-  std::size_t particles = 30;
-  std::uint64_t seed = 1;
+  std::filesystem::path save, load;
+  bool localise = false;
+  std::vector<double> window;
+  std::optional<double> resolution;
+  std::optional<std::size_t> particles;
+  std::optional<std::uint64_t> seed;
   unsigned threads = std::max(1U, std::thread::hardware_concurrency());
 };
 
@@ -47,7 +53,7 @@ struct Input {
 Input input_of(const Options& options) {
   Input input;
   if (options.log.empty()) {
-    const Drive drive = simulated_drive({.seed = options.seed});
+    const Drive drive = simulated_drive({.seed = options.seed.value_or(1)});
     input = {"rendered drive", drive.log, true_relations(drive)};
   } else {
     input.name = std::filesystem::path(options.log).filename().string();
@@ -58,10 +64,35 @@ Input input_of(const Options& options) {
   return input;
 }
 
-Results run_with_progress(const Input& input, const MapperOptions& options) {
+/// Says now what would otherwise be heard of after the work.
+void check_save(const std::filesystem::path& file) {
+  if (file.empty()) return;
+  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  if (!std::filesystem::is_directory(folder) || std::filesystem::is_directory(file))
+    cairn::raise(file.string() + ": expected the name of a file in a folder that there is");
+}
+
+Mapper mapper_of(const Options& options) {
+  if (!options.load.empty()) {
+    const MapRequest wanted{options.resolution, options.particles, options.seed, options.threads};
+    if (!options.localise) return Mapper::loaded(options.load, wanted);
+    std::optional<PlaceWindow> window;
+    if (!options.window.empty())
+      window = {options.window[0], options.window[1], options.window[2], options.window[3]};
+    return Mapper::localiser(options.load, wanted, window);
+  }
+  MapperOptions made;
+  made.particles = options.particles.value_or(made.particles);
+  made.seed = options.seed.value_or(made.seed);
+  made.threads = options.threads;
+  made.cell_size = options.resolution.value_or(made.cell_size);
+  return Mapper(made);
+}
+
+Results run_with_progress(Mapper& mapper, const Input& input) {
   const example::Interruption interruption;
   example::Progress progress(std::clog, "scans", input.log.scans.size());
-  return run(input.log, options, input.relations, [&]() -> std::optional<std::string> {
+  return run(mapper, input.log, input.relations, [&]() -> std::optional<std::string> {
     progress.step();
     if (const auto signal = example::Interruption::caught())
       return "interrupted (" + *signal + ") after " + std::to_string(progress.done()) + " scans";
@@ -94,6 +125,20 @@ int main(int argc, char** argv) {
   app.add_option("--relations", options.relations,
                  "relations to measure the path by: t1 t2 x y z roll pitch yaw");
   app.add_option("--out", options.out, "folder for the map, the trajectory, the summary and the report");
+  auto* load =
+      app.add_option("--load", options.load, "a map to go on with: the log goes on where that one ended");
+  auto* localise =
+      app.add_flag("--localise", options.localise, "leave the loaded map as it is, and find the way in it")
+          ->needs(load);
+  app.add_option("--window", options.window,
+                 "left bottom right top [m] of where the robot may be; without, it is where the map ended")
+      ->expected(4)
+      ->check(example::number_between(-1e6, 1e6))
+      ->needs(localise);
+  app.add_option("--save", options.save, "a file for the map and all that going on with it needs")
+      ->excludes(localise);
+  app.add_option("--resolution", options.resolution, "side of a cell [m]: 0.05, or what a loaded map has")
+      ->check(example::number_between(0.01, 1));
   app.add_option("--particles", options.particles, "number of particles")
       ->check(example::whole_number(1, 10000));
   app.add_option("--seed", options.seed, "the same seed gives the same results for any number of threads")
@@ -101,13 +146,15 @@ int main(int argc, char** argv) {
   app.add_option("--threads", options.threads, "threads")->check(example::whole_number(1, 1024));
   if (const std::optional<int> code = example::parse(app, name, argc, argv)) return *code;
   try {
+    check_save(options.save);
     const Input input = input_of(options);
+    Mapper mapper = mapper_of(options);
     prepare_folder(options.out);
-    Results results = run_with_progress(
-        input, {.particles = options.particles, .seed = options.seed, .threads = options.threads});
+    Results results = run_with_progress(mapper, input);
     results.name = input.name;
     if (results.ended_early) std::cerr << name << ": " << *results.ended_early << '\n';
     if (const auto no_report = write_outputs(results, options.out)) std::cout << *no_report << '\n';
+    if (!options.save.empty()) mapper.save(options.save);
     print(results, options.out);
     if (!example::flush_standard_output(name)) return example::exit_mistake;
     return results.ended_early ? example::exit_interrupted : example::exit_well;

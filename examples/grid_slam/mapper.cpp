@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <string>
 #include <utility>
 
@@ -94,8 +95,7 @@ const Mapper::Belief& Mapper::belief() const {
 bool Mapper::add(const cairn::StampedScan& scan) {
   bool due = scans_.empty();
   if (due) {
-    belief_.emplace(scan.T_odom_laser, empty_map(), options_.particles);
-    travelled_.push_back(0);
+    begin(scan);
   } else {
     const SE2 moved = scans_.back().T_odom_laser.inverse() * scan.T_odom_laser;
     accumulate(moved);
@@ -110,6 +110,71 @@ bool Mapper::add(const cairn::StampedScan& scan) {
   return due;
 }
 
+void Mapper::begin(const cairn::StampedScan& scan) {
+  travelled_.push_back(0);
+  if (window_) start_ = place_in_window(scan);
+  if (frozen_)
+    belief_.emplace(start_->mean, *frozen_, options_.particles);
+  else
+    belief_.emplace(scan.T_odom_laser, empty_map(), options_.particles);
+}
+
+Mapper Mapper::localiser(const std::filesystem::path& path, const MapRequest& wanted,
+                         const std::optional<PlaceWindow>& window) {
+  MapRequest of_map = wanted;
+  of_map.particles.reset();
+  const Mapper saved = loaded(path, of_map);
+  MapperOptions options = saved.options_;
+  options.particles = wanted.particles.value_or(options.particles);
+  options.loops.on = false;
+  Mapper mapper(options);
+  mapper.frozen_ = saved.belief()[saved.belief().best()].map;
+  mapper.start_ = saved.belief().pose();
+  mapper.start_->covariance +=
+      Matrix<3>(Vector<3>(0.04, 0.04, 0.01).asDiagonal());  // it may have been pushed
+  mapper.window_ = window;
+  if (!window) return mapper;
+  const PlaceWindow& w = *window;
+  if (!(w.left < w.right && w.bottom < w.top) || !std::isfinite(w.right - w.left) ||
+      !std::isfinite(w.top - w.bottom))
+    cairn::raise(
+        "grid_slam: expected a window whose left is below its right, and whose bottom is below its top");
+  bool known = false;
+  const cairn::GridGeometry& geometry = mapper.frozen_->grid.geometry();
+  mapper.frozen_->grid.cells().for_each_tile([&](cairn::TileAddress address, const auto& tile) {
+    const cairn::CellAddress corner = cairn::corner_of(address);
+    for (int i = 0; i < cairn::tile_cells; ++i) {
+      const cairn::CellAddress cell{corner.column + i % cairn::tile_side, corner.row + i / cairn::tile_side};
+      const double x = geometry.center_x(cell), y = geometry.center_y(cell);
+      known = known || (tile[static_cast<std::size_t>(i)].known() && w.left < x && x < w.right &&
+                        w.bottom < y && y < w.top);
+    }
+  });
+  if (!known) cairn::raise("grid_slam: the window lies outside of the map");
+  return mapper;
+}
+
+cairn::Gaussian<SE2> Mapper::place_in_window(const cairn::StampedScan& scan) const {
+  constexpr double view = 12;  // [m]: farther points say little more and cost much
+  const double x = 0.5 * (window_->left + window_->right), y = 0.5 * (window_->bottom + window_->top);
+  const double half_x = window_->right - x, half_y = window_->top - y;
+  std::vector<ScanPoint> near;
+  for (const ScanPoint& p : cairn::scan_points(scan.scan))
+    if (std::hypot(p.x, p.y) < view) near.push_back(p);
+  const cairn::OccupancyGrid& grid = frozen_->grid;
+  const cairn::CorrelativeSearch search(scores_around(grid, x, y, std::max(half_x, half_y) + view), 6);
+  const auto found = search.find(cairn::thinned(near, 0.2), SE2(x, y, 0), {half_x, half_y, std::numbers::pi},
+                                 options_.loops.enough_score);
+  if (!found) cairn::raise("grid_slam: no place in the window explains the first scan");
+  const cairn::MatchOptions fine{.model = options_.model};
+  const auto result = cairn::match(grid, near, found->pose, found->pose, Matrix<3>::Zero(), fine);
+  const Matrix<3> floor = Vector<3>(0.0025, 0.0025, 0.0004).asDiagonal();
+  const cairn::Cholesky<3> information(result.information);
+  if (result.status == cairn::MatchStatus::few_inliers || !information.good())
+    return {found->pose, 4 * floor};
+  return {result.pose, information.inverse() + floor};
+}
+
 void Mapper::accumulate(const SE2& moved) {
   const Vector<3> step = moved.log();
   motion_.forwards = motion_.forwards * moved;
@@ -119,6 +184,7 @@ void Mapper::accumulate(const SE2& moved) {
 }
 
 Matrix<3> Mapper::motion_noise() const {
+  if (steps_.empty() && frozen_) return start_->covariance;
   if (steps_.empty()) return Vector<3>(1e-6, 1e-6, 1e-6).asDiagonal();
   const OdometryNoise& n = options_.odometry;
   const double d = motion_.distance, a = motion_.angle;
@@ -153,6 +219,7 @@ void Mapper::process(const cairn::StampedScan& scan) {
   proposal.widened = options_.widened;
   const cairn::ConditionalFilter filter{.resample_below = options_.resample_below,
                                         .evidence_share = options_.evidence_share,
+                                        .insert = !frozen_.has_value(),
                                         .seed = options_.seed,
                                         .threads = options_.threads};
   points_.push_back(cairn::scan_points(scan.scan));

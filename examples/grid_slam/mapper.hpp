@@ -12,6 +12,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <optional>
 #include <vector>
@@ -80,6 +81,19 @@ struct StepRecord {
   cairn::Gaussian<cairn::SE2> pose;
 };
 
+/// What a run asks of a saved map; what it does not ask for is as it was.
+struct MapRequest {
+  std::optional<double> cell_size{};       ///< refused where the map has another
+  std::optional<std::size_t> particles{};  ///< the same, but for a localiser
+  std::optional<std::uint64_t> seed{};
+  unsigned threads = 1;
+};
+
+/// Where a robot may be [m].
+struct PlaceWindow {
+  double left = 0, bottom = 0, right = 0, top = 0;
+};
+
 /// Takes scans one by one.
 class Mapper {
 public:
@@ -88,10 +102,23 @@ public:
   /// Throws cairn::Error on options out of range.
   explicit Mapper(const MapperOptions& options);
 
+  /// A mapper that goes on where the saved one stood, bit for bit. Throws cairn::Error where the file is no
+  /// map, is damaged, or is not what is wanted.
+  [[nodiscard]] static Mapper loaded(const std::filesystem::path& path, const MapRequest& wanted = {});
+  /// A mapper that leaves the saved map of the best particle as it is. It begins where the saved one stood,
+  /// or, with a window, at the place in it, of any heading, that explains the first scan best. Throws as
+  /// loaded(), and where the window has no part of the map in it.
+  [[nodiscard]] static Mapper localiser(const std::filesystem::path& path, const MapRequest& wanted = {},
+                                        const std::optional<PlaceWindow>& window = std::nullopt);
+  /// Writes all that the mapper is, or, throwing cairn::Error, leaves the file as it was.
+  void save(const std::filesystem::path& path) const;
+
   /// The next scan of the log. Returns whether it was processed. Throws cairn::Error where the filter refuses
   /// the step, naming why.
   bool add(const cairn::StampedScan& scan);
 
+  [[nodiscard]] const MapperOptions& options() const noexcept { return options_; }
+  [[nodiscard]] const std::vector<cairn::StampedScan>& scans() const noexcept { return scans_; }
   [[nodiscard]] const std::vector<StepRecord>& steps() const noexcept { return steps_; }
   [[nodiscard]] const std::vector<Loop>& loops() const noexcept { return loops_; }
   /// Of a mapper that has taken a scan.
@@ -110,6 +137,10 @@ private:
     bool stood = false;
   };
 
+  template <class Archive>
+  static void plain_parts(Archive& archive, Mapper& mapper);
+  void begin(const cairn::StampedScan& scan);
+  [[nodiscard]] cairn::Gaussian<cairn::SE2> place_in_window(const cairn::StampedScan& scan) const;
   void accumulate(const cairn::SE2& moved);
   void process(const cairn::StampedScan& scan);
   [[nodiscard]] cairn::Matrix<3> motion_noise() const;
@@ -125,6 +156,9 @@ private:
 
   MapperOptions options_;
   std::optional<Belief> belief_;
+  std::optional<OccupancyMap> frozen_;  // what a localiser moves in
+  std::optional<PlaceWindow> window_;
+  std::optional<cairn::Gaussian<cairn::SE2>> start_;
   std::vector<StepRecord> steps_;
   std::vector<std::vector<cairn::ScanPoint>> points_;  // of the processed scans
   std::vector<double> travelled_;                      // [m] at each pose of the path

@@ -19,23 +19,21 @@ void measure(Results& r, const std::vector<cairn::PoseRelation>& relations) {
 
 }  // namespace
 
-Results run(const cairn::CarmenLog& log, const MapperOptions& options,
-            const std::vector<cairn::PoseRelation>& relations,
+Results run(Mapper& mapper, const cairn::CarmenLog& log, const std::vector<cairn::PoseRelation>& relations,
             const std::function<std::optional<std::string>()>& on_scan) {
   Results r;
-  r.seed = options.seed;
-  r.particles = options.particles;
-  r.threads = options.threads;
+  r.seed = mapper.options().seed;
+  r.particles = mapper.options().particles;
+  r.threads = mapper.options().threads;
   const auto begin = std::chrono::steady_clock::now();
   const std::clock_t cpu = std::clock();
-  Mapper mapper(options);
   for (const cairn::StampedScan& scan : log.scans) {
     mapper.add(scan);
-    ++r.scans;
-    r.odometry.push_back({scan.time, scan.T_odom_laser});
     if (on_scan) r.ended_early = on_scan();
     if (r.ended_early) break;
   }
+  r.scans = mapper.scans().size();
+  for (const cairn::StampedScan& scan : mapper.scans()) r.odometry.push_back({scan.time, scan.T_odom_laser});
   r.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   r.cpu_seconds = static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC;
   r.steps = mapper.steps();
@@ -53,6 +51,13 @@ Results run(const cairn::CarmenLog& log, const MapperOptions& options,
   }
   measure(r, relations);
   return r;
+}
+
+Results run(const cairn::CarmenLog& log, const MapperOptions& options,
+            const std::vector<cairn::PoseRelation>& relations,
+            const std::function<std::optional<std::string>()>& on_scan) {
+  Mapper mapper(options);
+  return run(mapper, log, relations, on_scan);
 }
 
 }  // namespace grid_slam

@@ -18,8 +18,13 @@
 
 namespace grid_slam {
 
-/// Maps the log. `on_scan` is called after every scan; what it returns, if anything, ends the run and says
-/// why. Relations may be none. Throws cairn::Error where the log cannot be mapped.
+/// Lets the mapper take the log. `on_scan` is called after every scan; what it returns, if anything, ends the
+/// run and says why. Relations may be none. Throws cairn::Error where the log cannot be mapped.
+[[nodiscard]] Results run(Mapper& mapper, const cairn::CarmenLog& log,
+                          const std::vector<cairn::PoseRelation>& relations,
+                          const std::function<std::optional<std::string>()>& on_scan = {});
+
+/// The same with a new mapper.
 [[nodiscard]] Results run(const cairn::CarmenLog& log, const MapperOptions& options,
                           const std::vector<cairn::PoseRelation>& relations,
                           const std::function<std::optional<std::string>()>& on_scan = {});

@@ -77,6 +77,7 @@
 #include <cairn/geometry/stereo_rig.hpp>
 #include <cairn/geometry/triangulation.hpp>
 #include <cairn/grid/distance_field.hpp>
+#include <cairn/grid/height_cell.hpp>
 #include <cairn/grid/ray.hpp>
 #include <cairn/grid/shared_tiles.hpp>
 #include <cairn/grid/tile.hpp>

@@ -31,6 +31,17 @@ TEST_SUITE("statistics") {
     CHECK(cairn::chi_square_cdf(INFINITY, 2) == 1.0);
   }
 
+  TEST_CASE("log_gamma: factorials, the half's root of pi, and the library's function") {
+    double factorial = 1;
+    for (int n = 1; n <= 20; factorial *= n, ++n)
+      CHECK(cairn::log_gamma(n) == doctest::Approx(std::log(factorial)).epsilon(1e-14));
+    CHECK(std::exp(2 * cairn::log_gamma(0.5)) == doctest::Approx(std::acos(-1.0)).epsilon(1e-14));
+    for (double x = 1e-6; x < 1e8; x *= 1.37) {
+      const double known = std::lgamma(x);
+      CHECK(std::abs(cairn::log_gamma(x) - known) <= 1e-14 * std::max(1.0, std::abs(known)));
+    }
+  }
+
   TEST_CASE("log_sum_exp: survives numbers whose exponentials do not") {
     const std::vector<double> values{-1000.0, -1000.0, -1000.0, -1000.0};
     CHECK(cairn::log_sum_exp(values) == doctest::Approx(-1000.0 + std::log(4.0)));

@@ -158,6 +158,40 @@ TEST_SUITE("filter/conditional") {
           }).find("at least one") != std::string::npos);
   }
 
+  TEST_CASE(
+      "conditional: of several draws one is kept: the weight's mean is the evidence, the pose's the "
+      "posterior's") {
+    const std::uint64_t seed = cairn_test::seed(7);
+    CAPTURE(seed);
+    Random random(seed);
+    const Memory map;
+    const double z = 2.2, r = map.sigma * map.sigma;
+    const Gaussian<Line> prior = moved(Line(0.5));
+    const double evidence =
+        std::exp(log_density(Gaussian<Line>{prior.mean, Matrix<1>(motion_variance + r)}, Line(z)));
+    const double gain = motion_variance / (motion_variance + r);
+    const double mean = prior.mean(0) + gain * (z - prior.mean(0)), variance = (1 - gain) * motion_variance;
+    for (const std::size_t draws : {std::size_t{1}, std::size_t{2}, std::size_t{9}}) {
+      CAPTURE(draws);
+      constexpr int trials = 40000;
+      double sum = 0, weighted = 0, squares = 0;
+      for (int trial = 0; trial < trials; ++trial) {
+        const auto proposed = FromMotion{draws}(map, prior, z, random);
+        const double weight = std::exp(proposed.log_weight);
+        CHECK(proposed.log_likelihood == map.log_likelihood(proposed.pose, z));
+        sum += weight;
+        weighted += weight * proposed.pose(0);
+        squares += weight * (proposed.pose(0) - mean) * (proposed.pose(0) - mean);
+      }
+      CHECK(sum / trials == doctest::Approx(evidence).epsilon(0.03));
+      CHECK(weighted / sum == doctest::Approx(mean).epsilon(0.02));
+      CHECK(squares / sum == doctest::Approx(variance).epsilon(0.05));
+    }
+    // Where no draw has a likelihood the weight says so.
+    const auto lost = FromMotion{3}(map, prior, std::numeric_limits<double>::infinity(), random);
+    CHECK_FALSE(lost.log_weight > -1e300);
+  }
+
   TEST_CASE("conditional: regimes are drawn by their shares and stay with the particle") {
     MappedPaths<Memory> belief(Line(0.0), Memory{.sigma = 1e6}, 4000);
     const auto either = [](const Line& x, std::size_t regime) {

@@ -105,6 +105,20 @@ TEST_SUITE("grid/shared_tiles") {
     CHECK(Living::count == before);
   }
 
+  TEST_CASE("shared_tiles: a tile taken from another grid is shared until one of them writes") {
+    SharedTiles<int> from, to;
+    from.write({1000, -3}) = 7;
+    to.write({0, 0}) = 1;
+    to.share_tile(tile_of({1000, -3}), from);
+    to.share_tile({5, 5}, from);
+    CHECK(to.tile(tile_of({1000, -3})) == from.tile(tile_of({1000, -3})));
+    CHECK(to.tile({5, 5}) == nullptr);
+    to.write({1000, -3}) = 8;
+    CHECK(from.read({1000, -3}) == 7);
+    CHECK(to.read({1000, -3}) == 8);
+    CHECK(to.read({0, 0}) == 1);
+  }
+
   TEST_CASE("shared_tiles: what was never written is the empty cell, near and far") {
     SharedTiles<int> grid;
     CHECK(grid.read({0, 0}) == 0);

@@ -104,6 +104,72 @@ TEST_SUITE("grid_slam/program") {
     CHECK(std::count(path.begin(), path.end(), '\n') == 150);
   }
 
+  TEST_CASE("grid_slam: a log in two runs, by way of a saved map, gives the bytes of one run") {
+    const cairn_test::Folder folder;
+    for (const char* name : {"whole", "begin", "end"}) fs::create_directory(folder / name);
+    const std::string log = short_log(160);
+    std::size_t cut = 0;
+    for (int line = 0; line < 90; ++line) cut = log.find('\n', cut) + 1;
+    folder.put("whole/log", log);  // the name of a log is part of the summary
+    folder.put("begin/log", log.substr(0, cut));
+    folder.put("end/log", log.substr(cut));
+    const auto named = [&](const std::string& name) { return "\"" + (folder / name).string() + "\""; };
+    const auto log_and_out = [&](const std::string& name) {
+      return " --log " + named(name + "/log") + " --out " + named("out_" + name);
+    };
+    REQUIRE(run("--particles 5 --seed 9" + log_and_out("whole") + " --save " + named("whole.map")).code == 0);
+    REQUIRE(run("--particles 5 --seed 9" + log_and_out("begin") + " --save " + named("begin.map")).code == 0);
+    REQUIRE(
+        run("--threads 3 --load " + named("begin.map") + log_and_out("end") + " --save " + named("end.map"))
+            .code == 0);
+    for (const std::string& name : results()) {
+      if (name == "timing.json") continue;
+      CAPTURE(name);
+      CHECK(cairn::read_file(folder / "out_whole" / name) == cairn::read_file(folder / "out_end" / name));
+    }
+    CHECK(cairn::read_file(folder / "whole.map") == cairn::read_file(folder / "end.map"));
+  }
+
+  TEST_CASE("grid_slam: a map that is none, or another, is a line and exit code 2, and nothing is lost") {
+    const cairn_test::Folder folder;
+    folder.put("log", short_log(40));
+    const auto named = [&](const std::string& name) { return "\"" + (folder / name).string() + "\""; };
+    const std::string with_log = " --log " + named("log") + " --out " + named("out");
+    REQUIRE(run("--particles 3" + with_log + " --save " + named("map")).code == 0);
+    const std::string map = cairn::read_file(folder / "map"),
+                      summary = cairn::read_file(folder / "out" / "summary.json");
+    std::string damaged = map;
+    damaged[map.size() / 2] = static_cast<char>(damaged[map.size() / 2] ^ 1);
+    folder.put("damaged", damaged);
+    folder.put("torn", map.substr(0, map.size() / 3));
+    folder.put("head", map.substr(0, 30));
+    folder.put("empty", "");
+    folder.put("other", "P5 1 1 255 x");
+    folder.put("longer", map + "x");
+    for (const std::string& mistake :
+         {"--load " + named("damaged"), "--load " + named("torn"), "--load " + named("head"),
+          "--load " + named("empty"), "--load " + named("other"), "--load " + named("longer"),
+          "--load " + named("none"), "--load " + named("map") + " --resolution 0.1",
+          "--load " + named("map") + " --particles 4", std::string("--localise"),
+          "--load " + named("map") + " --window 0 0 1 1",
+          "--load " + named("map") + " --localise --window 1 1 0 0",
+          "--load " + named("map") + " --localise --window 500 500 510 510",
+          "--load " + named("map") + " --localise --save " + named("again"),
+          "--save " + named("no/folder/map"), "--save " + named("out")}) {
+      CAPTURE(mistake);
+      const Outcome outcome = run(mistake + with_log);
+      CAPTURE(outcome.words);
+      CHECK(outcome.code == 2);
+      CHECK(outcome.words.size() > 10);
+      CHECK(cairn::read_file(folder / "out" / "summary.json") == summary);
+    }
+    CHECK(cairn::read_file(folder / "map") == map);
+    CHECK(run("--load " + named("map") + " --resolution 0.1" + with_log).says("cells of 0.05 m"));
+    CHECK(run("--load " + named("torn") + with_log).says("ends too early"));
+    CHECK(run("--load " + named("map") + " --localise --window 500 500 510 510" + with_log)
+              .says("outside of the map"));
+  }
+
   TEST_CASE("grid_slam: interrupted, it writes the scans until then") {
     const cairn_test::Folder folder;
     CHECK(cairn_test::interrupt_program({program, "--particles", "2", "--out", (folder / "out").string()},

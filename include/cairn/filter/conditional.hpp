@@ -29,6 +29,7 @@
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/parallel.hpp>
 #include <cairn/core/random.hpp>
+#include <cairn/core/statistics.hpp>
 #include <cairn/filter/detail/path_tree.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/particle.hpp>
@@ -89,15 +90,32 @@ struct RegimeMotion {
   std::vector<Mode> modes;
 };
 
-/// Poses drawn from the motion and weighed by the likelihood: the bootstrap filter.
+/// Poses drawn from the motion and weighed by the likelihood: the bootstrap filter. Of several draws a
+/// particle keeps one by its likelihood, and weighs their mean: as unbiased as one draw, and steadier.
 struct FromMotion {
+  std::size_t draws = 1;  ///< at least 1
+
   template <ConditionalMap M>
   [[nodiscard]] Proposed<typename M::Pose> operator()(const M& map, const Gaussian<typename M::Pose>& motion,
                                                       const typename M::Observation& z,
                                                       Random& random) const {
-    typename M::Pose pose = sample(motion, random);
-    const double log_likelihood = map.log_likelihood(pose, z);
-    return {std::move(pose), motion, log_likelihood, log_likelihood, 0};
+    CAIRN_EXPECTS(draws > 0, "FromMotion needs at least one draw");
+    std::vector<typename M::Pose> poses;
+    std::vector<double> log_likelihoods;
+    for (std::size_t k = 0; k < draws; ++k) {
+      poses.push_back(sample(motion, random));
+      log_likelihoods.push_back(map.log_likelihood(poses.back(), z));
+    }
+    if (draws == 1) return {std::move(poses[0]), motion, log_likelihoods[0], log_likelihoods[0], 0};
+    const double total = log_sum_exp(log_likelihoods);
+    std::size_t chosen = 0;
+    for (double left = random.uniform(); chosen + 1 < draws; ++chosen) {
+      const double share = std::exp(log_likelihoods[chosen] - total);
+      if (!(left >= share)) break;  // also where no draw has a likelihood
+      left -= share;
+    }
+    return {std::move(poses[chosen]), motion, total - std::log(static_cast<double>(draws)),
+            log_likelihoods[chosen], 0};
   }
   /// The regime is drawn by its share first.
   template <ConditionalMap M>
@@ -126,6 +144,23 @@ struct PathPose {
   std::uint64_t step = 0;  ///< 0 for the start
 };
 
+/// All of a belief but its maps, as plain values: for files.
+template <Manifold X>
+struct PathsRecord {
+  struct Node {
+    PathPose<X> pose;
+    std::uint32_t parent;  ///< an earlier node, or 2^32 - 1
+  };
+  struct Particle {
+    std::uint32_t node;
+    double log_evidence, log_weight;
+    std::size_t regime;
+  };
+  std::vector<Node> nodes;
+  std::vector<Particle> particles;
+  std::uint64_t step = 0;
+};
+
 /// Weighted particles, each with a pose, a map and the path that led there.
 template <ConditionalMap M>
 class MappedPaths {
@@ -148,6 +183,52 @@ public:
     for (std::size_t i = 0; i < count; ++i)
       all.push_back({start, map, paths_.extend(Tree::none, {start, {start, none}, start, start, 0}), 0, 0});
     particles_ = Particles<Particle>::equal(std::move(all));
+  }
+
+  /// The belief that record() described, with its particles' maps in their order. Throws Error where the two
+  /// do not fit each other.
+  MappedPaths(const PathsRecord<Pose>& record, std::vector<M> maps) : step_(record.step) {
+    if (record.particles.empty() || record.particles.size() != maps.size())
+      raise("MappedPaths: expected as many maps as particles, and at least one");
+    for (std::size_t i = 0; i < record.nodes.size(); ++i) {
+      const auto& [pose, parent] = record.nodes[i];
+      if (parent != Tree::none && parent >= i) raise("MappedPaths: expected parents before their children");
+      paths_.extend(parent, pose);
+    }
+    std::vector<Particle> all;
+    std::vector<double> log_weights;
+    for (std::size_t i = 0; i < maps.size(); ++i) {
+      const auto& [node, log_evidence, log_weight, regime] = record.particles[i];
+      if (node >= record.nodes.size()) raise("MappedPaths: expected particles at nodes that there are");
+      paths_.hold(node);
+      all.push_back({paths_.at(node).pose, std::move(maps[i]), node, log_evidence, regime});
+      log_weights.push_back(log_weight);
+    }
+    for (std::size_t i = 0; i < record.nodes.size(); ++i) paths_.release(static_cast<std::uint32_t>(i));
+    particles_ = Particles<Particle>::equal(std::move(all));
+    particles_.log_weights = std::move(log_weights);
+  }
+  /// What makes this belief again, together with the maps.
+  [[nodiscard]] PathsRecord<Pose> record() const {
+    PathsRecord<Pose> record{.nodes = {}, .particles = {}, .step = step_};
+    std::vector<std::uint32_t> number;  // of a node of the tree in the record
+    const auto numbered = [&](std::uint32_t node) {
+      std::vector<std::uint32_t> fresh;
+      number.resize(std::max<std::size_t>(number.size(), paths_.slots()), Tree::none);
+      for (; node != Tree::none && number[node] == Tree::none; node = paths_.parent(node))
+        fresh.push_back(node);
+      for (; !fresh.empty(); fresh.pop_back()) {
+        const std::uint32_t parent = paths_.parent(fresh.back());
+        number[fresh.back()] = static_cast<std::uint32_t>(record.nodes.size());
+        record.nodes.push_back({paths_.at(fresh.back()), parent == Tree::none ? Tree::none : number[parent]});
+      }
+    };
+    for (std::size_t i = 0; i < size(); ++i) {
+      const Particle& p = (*this)[i];
+      numbered(p.node);
+      record.particles.push_back({number[p.node], p.log_evidence, particles_.log_weights[i], p.regime});
+    }
+    return record;
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return particles_.size(); }

@@ -17,6 +17,7 @@
 #include <cstdint>
 #include <limits>
 #include <span>
+#include <utility>
 
 #include <cairn/core/check.hpp>
 #include <cairn/grid/shared_tiles.hpp>
@@ -70,6 +71,11 @@ public:
   explicit DistanceField(double radius = 5) : radius_(radius) {
     if (!(radius > 0 && radius <= largest_radius))
       raise("DistanceField: expected a radius above 0 and up to 6 cells");
+  }
+
+  /// The same with tiles of a field of this radius, as tiles() of another gave them.
+  DistanceField(double radius, SharedTiles<NearestObstacle> tiles) : DistanceField(radius) {
+    tiles_ = std::move(tiles);
   }
 
   [[nodiscard]] double radius() const noexcept { return radius_; }

@@ -54,6 +54,16 @@ public:
     return root.blocks[root.place(address)].own()[place_in_block(address)].own();
   }
 
+  /// Makes the tile of `other` this grid's too, shared until one of them writes. Nothing where there is none.
+  /// Throws Error as write does.
+  void share_tile(TileAddress address, const SharedTiles& other) {
+    if (other.tile(address) == nullptr) return;
+    const Block& block = *other.root_.get()->blocks[other.root_.get()->place(address)].get();
+    if (!root_ || root_.get()->place(address) == none) grow(address);
+    Root& root = root_.own();
+    root.blocks[root.place(address)].own()[place_in_block(address)] = block[place_in_block(address)];
+  }
+
   /// Calls visit(address, tile) for every tile there is, by rows of blocks: the same order for equal writes.
   template <class Visit>
   void for_each_tile(Visit&& visit) const {

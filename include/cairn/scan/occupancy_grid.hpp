@@ -61,6 +61,15 @@ public:
       raise("OccupancyGrid: expected a cell size above zero and a finite origin");
   }
 
+  /// The grid again whose cells() and field().tiles() these are, with the same options: from a file.
+  OccupancyGrid(const OccupancyOptions& options, SharedTiles<OccupancyCell> cells,
+                SharedTiles<NearestObstacle> field)
+      : OccupancyGrid(options) {
+    cells_ = std::move(cells);
+    field_ = DistanceField(options.field_radius, std::move(field));
+    cells_.for_each_tile([&](TileAddress, const auto&) { empty_ = false; });
+  }
+
   [[nodiscard]] const GridGeometry& geometry() const noexcept { return geometry_; }
   [[nodiscard]] const SharedTiles<OccupancyCell>& cells() const noexcept { return cells_; }
   [[nodiscard]] const DistanceField& field() const noexcept { return field_; }

@@ -50,6 +50,9 @@ public:
     }
   }
 
+  [[nodiscard]] Node parent(Node node) const { return nodes_[node].parent; }
+  /// One more than the largest node.
+  [[nodiscard]] std::size_t slots() const noexcept { return nodes_.size(); }
   [[nodiscard]] const Entry& at(Node node) const { return nodes_[node].entry; }
   /// Entries from the root to the node.
   [[nodiscard]] std::vector<Entry> path_to(Node node) const {

@@ -1,0 +1,206 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+// Mapper::save and Mapper::loaded: all that a mapper is, so that going on from a file is going on.
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <cairn/core/check.hpp>
+#include <cairn/grid/shared_tiles.hpp>
+#include <cairn/io/file.hpp>
+#include <cairn/io/text.hpp>
+
+#include "archive.hpp"
+#include "mapper.hpp"
+
+namespace cairn {
+inline namespace CAIRN_ABI {
+
+// Found by the archive, beside the types.
+template <class Archive>
+void parts(Archive& archive, LaserScan& s) {
+  archive(s.first_angle, s.angle_step, s.nearest, s.farthest, s.range);
+}
+template <class Archive>
+void parts(Archive& archive, StampedScan& s) {
+  archive(s.time, s.T_odom_laser, s.T_odom_robot, s.scan);
+}
+template <class Archive>
+void parts(Archive& archive, ScanPoint& p) {
+  archive(p.x, p.y);
+}
+template <class Archive>
+void parts(Archive& archive, PathsRecord<SE2>::Node& n) {
+  auto& q = n.pose.drawn_from;
+  archive(n.pose.pose, q.mean, q.covariance, n.pose.before, n.pose.drawn, n.pose.step, n.parent);
+}
+template <class Archive>
+void parts(Archive& archive, PathsRecord<SE2>::Particle& p) {
+  archive(p.node, p.log_evidence, p.log_weight, p.regime);
+}
+template <class Archive>
+void parts(Archive& archive, PathsRecord<SE2>& r) {
+  archive(r.nodes, r.particles, r.step);
+}
+template <class Archive>
+void parts(Archive& archive, OccupancyCell& c) {
+  archive(c.visits, c.hits, c.mean_x, c.mean_y);
+}
+template <class Archive>
+void parts(Archive& archive, NearestObstacle& o) {
+  archive(o.dx, o.dy, o.normal_x, o.normal_y);
+}
+template <class Archive>
+void parts(Archive& archive, TileAddress& a) {
+  archive(a.column, a.row);
+}
+template <class Archive>
+void parts(Archive& archive, EndPointModel& m) {
+  archive(m.sigma, m.outliers, m.independence);
+}
+
+}  // namespace CAIRN_ABI
+}  // namespace cairn
+
+namespace grid_slam {
+
+template <class Archive>
+void parts(Archive& archive, StepRecord& s) {
+  archive(s.scan, s.effective_size, s.resampled, s.moved, s.pose.mean, s.pose.covariance);
+}
+template <class Archive>
+void parts(Archive& archive, Loop& l) {
+  archive(l.first, l.last, l.T_first_last, l.covariance);
+}
+
+namespace {
+
+constexpr std::string_view mark = "cairn grid_slam map 1\n";
+
+/// Grids that share tiles: every tile once, and for each grid the numbers of its own.
+template <class Cell>
+struct TileStore {
+  struct Tile {
+    cairn::TileAddress address;
+    std::vector<Cell> cells;
+  };
+  std::vector<Tile> tiles;
+  std::vector<std::vector<std::uint32_t>> of_grid;
+
+  template <class Archive>
+  friend void parts(Archive& archive, Tile& t) {
+    archive(t.address, t.cells);
+  }
+  template <class Archive>
+  friend void parts(Archive& archive, TileStore& s) {
+    archive(s.tiles, s.of_grid);
+  }
+
+  void add(const cairn::SharedTiles<Cell>& grid) {
+    auto& numbers = of_grid.emplace_back();
+    grid.for_each_tile([&](cairn::TileAddress address, const auto& tile) {
+      const auto [place, fresh] = known_.try_emplace(&tile, static_cast<std::uint32_t>(tiles.size()));
+      if (fresh) tiles.push_back({address, {tile.begin(), tile.end()}});
+      numbers.push_back(place->second);
+    });
+  }
+
+  [[nodiscard]] std::vector<cairn::SharedTiles<Cell>> grids(const Reader& reader) const {
+    std::vector<cairn::SharedTiles<Cell>> single(tiles.size()), all(of_grid.size());
+    for (std::size_t i = 0; i < tiles.size(); ++i) {
+      if (tiles[i].cells.size() != cairn::tile_cells) reader.refuse("a tile of the map has another size");
+      std::ranges::copy(tiles[i].cells, single[i].writable_tile(tiles[i].address).begin());
+    }
+    for (std::size_t g = 0; g < all.size(); ++g)
+      for (const std::uint32_t number : of_grid[g]) {
+        if (number >= tiles.size()) reader.refuse("the map names a tile that it does not have");
+        all[g].share_tile(tiles[number].address, single[number]);
+      }
+    return all;
+  }
+
+private:
+  std::map<const void*, std::uint32_t> known_;  // looked up only; its order decides nothing
+};
+
+}  // namespace
+
+/// What of a mapper is neither a map nor a path.
+template <class Archive>
+void Mapper::plain_parts(Archive& archive, Mapper& m) {
+  archive(m.steps_, m.points_, m.travelled_, m.scans_, m.loops_);
+  archive(m.motion_.forwards, m.motion_.backwards, m.motion_.distance, m.motion_.angle, m.motion_.stood);
+  archive(m.looked_, m.asked_, m.asked_at_);
+}
+
+void Mapper::save(const std::filesystem::path& path) const {
+  if (!belief_) cairn::raise("grid_slam: a map without a scan is not saved");
+  if (frozen_) cairn::raise("grid_slam: a map that is only localised in is not saved again");
+  Mapper copy = *this;  // the archive's functions serve reading too, so they want what may be changed
+  MapperOptions& options = copy.options_;
+  cairn::PathsRecord<cairn::SE2> record = belief_->record();
+  TileStore<cairn::OccupancyCell> cells;
+  TileStore<cairn::NearestObstacle> fields;
+  for (std::size_t i = 0; i < belief_->size(); ++i) {
+    cells.add((*belief_)[i].map.grid.cells());
+    fields.add((*belief_)[i].map.grid.field().tiles());
+  }
+  Writer writer;
+  writer(options.cell_size, options.field_radius, options.model, options.particles, options.seed, record,
+         cells, fields);
+  plain_parts(writer, copy);
+  std::uint64_t sum = sum_of(writer.bytes());
+  Writer tail;
+  tail(sum);
+  cairn::write_file_atomically(path, std::string(mark) + writer.bytes() + tail.bytes());
+}
+
+Mapper Mapper::loaded(const std::filesystem::path& path, const MapRequest& wanted) {
+  const std::string bytes = cairn::read_file(path, "a map of grid_slam");
+  const std::string name = path.string();
+  std::string_view rest = bytes;
+  if (!rest.starts_with(mark)) Reader(rest, name).refuse("expected a map that grid_slam --save wrote");
+  rest.remove_prefix(mark.size());
+  std::uint64_t sum = 0;
+  if (rest.size() < sizeof sum) Reader(rest, name).refuse("the map ends too early");
+  Reader tail(rest.substr(rest.size() - sizeof sum), name);
+  tail(sum);
+  rest.remove_suffix(sizeof sum);
+  if (sum != sum_of(rest))
+    Reader(rest, name).refuse("the map is damaged or ends too early: its sum is wrong");
+  Reader reader(rest, name);
+  MapperOptions options;
+  cairn::PathsRecord<cairn::SE2> record;
+  TileStore<cairn::OccupancyCell> cells;
+  TileStore<cairn::NearestObstacle> fields;
+  reader(options.cell_size, options.field_radius, options.model, options.particles, options.seed, record,
+         cells, fields);
+  if (wanted.cell_size && *wanted.cell_size != options.cell_size)
+    reader.refuse("expected cells of " + cairn::shortest(*wanted.cell_size) +
+                  " m, found a map with cells of " + cairn::shortest(options.cell_size) + " m");
+  if (wanted.particles && *wanted.particles != options.particles)
+    reader.refuse("expected " + std::to_string(*wanted.particles) + " particles, found a map of " +
+                  std::to_string(options.particles));
+  options.seed = wanted.seed.value_or(options.seed);
+  options.threads = wanted.threads;
+  Mapper mapper(options);
+  plain_parts(reader, mapper);
+  if (!reader.at_end()) reader.refuse("expected the map's end, found more");
+  auto cell_grids = cells.grids(reader);
+  auto field_grids = fields.grids(reader);
+  if (cell_grids.size() != field_grids.size()) reader.refuse("the map has cells without a distance field");
+  std::vector<OccupancyMap> maps;
+  for (std::size_t i = 0; i < cell_grids.size(); ++i)
+    maps.push_back({cairn::OccupancyGrid({{options.cell_size, 0, 0}, options.field_radius},
+                                         std::move(cell_grids[i]), std::move(field_grids[i])),
+                    options.model});
+  mapper.belief_.emplace(record, std::move(maps));
+  return mapper;
+}
+
+}  // namespace grid_slam

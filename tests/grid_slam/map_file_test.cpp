@@ -1,0 +1,134 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include <cairn/core/random.hpp>
+#include <cairn/io/file.hpp>
+
+#include "archive.hpp"
+#include "floor_plan.hpp"
+#include "mapper.hpp"
+#include "outputs.hpp"
+#include "support/folder.hpp"
+
+namespace map_file_test {
+namespace {
+
+using namespace grid_slam;
+using cairn::SE2;
+
+struct MappedFloor {
+  std::string bytes;
+  std::vector<cairn::StampedPose2> path;  ///< a map is a little bent, and these are poses in it
+};
+
+/// A map of the whole corridor, once for all cases.
+const MappedFloor& mapped_floor() {
+  static const MappedFloor mapped = [] {
+    const cairn_test::Folder folder;
+    const Drive drive = simulated_drive({});
+    Mapper mapper({.particles = 4});
+    for (const auto& scan : drive.log.scans) mapper.add(scan);
+    mapper.save(folder / "map");
+    return MappedFloor{cairn::read_file(folder / "map"), mapper.rematched()};
+  }();
+  return mapped;
+}
+
+/// A drive through the same floor, along the same path with other noise, its odometry in a frame of its own.
+Drive another_drive() {
+  Drive drive = simulated_drive({.seed = 7});
+  const SE2 elsewhere(30, -12, 2.1);
+  for (auto& scan : drive.log.scans) {
+    scan.T_odom_laser = elsewhere * scan.T_odom_laser;
+    scan.T_odom_robot = elsewhere * scan.T_odom_robot;
+  }
+  return drive;
+}
+
+}  // namespace
+
+TEST_SUITE("grid_slam/map_file") {
+  TEST_CASE("map_file: particles of a loaded map share what they shared") {
+    const cairn_test::Folder folder;
+    const Drive drive = simulated_drive({.seed = 2});
+    Mapper mapper({.particles = 6, .seed = 2});
+    for (std::size_t i = 0; i < 300; ++i) mapper.add(drive.log.scans[i]);
+    mapper.save(folder / "map");
+    const Mapper again = Mapper::loaded(folder / "map");
+    CHECK(map_bytes(again.belief()) == map_bytes(mapper.belief()));
+    CHECK(again.belief().stored_poses() == mapper.belief().stored_poses());
+    again.save(folder / "again");
+    CHECK(cairn::read_file(folder / "map") == cairn::read_file(folder / "again"));
+  }
+
+  TEST_CASE("map_file: a robot set down anywhere on the floor finds itself, and the map stays as it is") {
+    const cairn_test::Folder folder;
+    folder.put("map", mapped_floor().bytes);
+    const Drive drive = another_drive();
+    for (const std::size_t first : {std::size_t{150}, std::size_t{420}, std::size_t{700}}) {
+      CAPTURE(first);
+      Mapper mapper =
+          Mapper::localiser(folder / "map", {.particles = 10, .threads = 2}, PlaceWindow{-4, -4, 28, 20});
+      const auto& before = mapper;
+      for (std::size_t i = first; i < first + 120; ++i) mapper.add(drive.log.scans[i]);
+      const auto path = before.trajectory(true);
+      REQUIRE(path.size() == 120);
+      for (std::size_t i = 0; i < path.size(); i += 10) {
+        const SE2 expected = mapped_floor().path[first + i].pose;
+        CHECK((path[i].pose.translation() - expected.translation()).norm() < 0.08);
+        CHECK(std::abs(cairn::wrapped(path[i].pose.angle() - expected.angle())) < 0.02);
+      }
+      CHECK(mapper.belief()[0].map.grid.cells().tile({0, 0}) ==
+            mapper.belief()[mapper.belief().best()].map.grid.cells().tile({0, 0}));
+      CHECK(cairn_test::message_of([&] { mapper.save(folder / "again"); }).find("localised") !=
+            std::string::npos);
+    }
+  }
+
+  TEST_CASE("map_file: without a window localising begins where the map ended") {
+    const cairn_test::Folder folder;
+    const Drive drive = simulated_drive({.seed = 2});
+    Mapper mapper({.particles = 6, .seed = 2});
+    for (std::size_t i = 0; i < 300; ++i) mapper.add(drive.log.scans[i]);
+    mapper.save(folder / "map");
+    Mapper localiser = Mapper::localiser(folder / "map");
+    for (std::size_t i = 300; i < 305; ++i) {
+      localiser.add(drive.log.scans[i]);
+      mapper.add(drive.log.scans[i]);
+    }
+    const SE2 expected = mapper.trajectory(true)[300].pose;
+    CHECK((localiser.trajectory(true).front().pose.translation() - expected.translation()).norm() < 0.05);
+  }
+
+  TEST_CASE("map_file: a scan that no place explains is refused in words") {
+    const cairn_test::Folder folder;
+    folder.put("map", mapped_floor().bytes);
+    Drive drive = another_drive();
+    cairn::Random random(3);
+    for (float& r : drive.log.scans[0].scan.range) r = static_cast<float>(random.uniform(0.3, 9));
+    Mapper mapper = Mapper::localiser(folder / "map", {}, PlaceWindow{-4, -4, 28, 20});
+    CHECK(cairn_test::message_of([&] { mapper.add(drive.log.scans[0]); }).find("no place in the window") !=
+          std::string::npos);
+  }
+
+  TEST_CASE("map_file: the sum notices a bit anywhere, and bytes that are missing") {
+    const std::string bytes = "a map of some length, not a multiple of eight";
+    const std::uint64_t sum = sum_of(bytes);
+    for (std::size_t i = 0; i < bytes.size(); ++i)
+      for (int bit = 0; bit < 8; ++bit) {
+        std::string other = bytes;
+        other[i] = static_cast<char>(other[i] ^ (1 << bit));
+        CHECK(sum_of(other) != sum);
+      }
+    CHECK(sum_of(bytes.substr(0, 40)) != sum);
+    CHECK(sum_of(bytes + std::string(3, '\0')) != sum);
+  }
+}
+
+}  // namespace map_file_test
