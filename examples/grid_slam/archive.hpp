@@ -2,17 +2,14 @@
 // SPDX-License-Identifier: MIT
 //
 /// @file
-/// Values to bytes and back, bit for bit: little-endian, with a mark in front and a sum behind.
+/// Values to the numbers of a file and back (cairn/io/binary_file.hpp), bit for bit.
 ///
 /// One function template says what a type is made of, and serves both ways:
 ///   void parts(auto& archive, Loop& loop) { archive(loop.first, loop.last, loop.T_first_last, ...); }
 #pragma once
 
-#include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -23,26 +20,33 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/filter/gaussian.hpp>
+#include <cairn/io/binary_file.hpp>
 #include <cairn/manifold/se2.hpp>
 
 namespace grid_slam {
 
-static_assert(std::endian::native == std::endian::little, "map files are little-endian");
-
 template <class T>
 concept PlainNumber = std::is_arithmetic_v<T> || std::is_enum_v<T>;
 
-/// FNV-1a over words of 8 bytes: it is to notice damage, not malice.
-[[nodiscard]] inline std::uint64_t sum_of(std::string_view bytes) noexcept {
-  std::uint64_t sum = 0xcbf29ce484222325U;
-  for (std::size_t i = 0; i < bytes.size(); i += 8) {
-    std::uint64_t word = 0;
-    std::memcpy(&word, bytes.data() + i, std::min<std::size_t>(8, bytes.size() - i));
-    sum = (sum ^ word) * 0x100000001b3U;
-    sum ^= sum >> 29U;
-  }
-  return sum ^ bytes.size();
-}
+namespace detail {
+template <class T>
+struct InFile {
+  using type = T;
+};
+template <class T>
+  requires std::is_enum_v<T>
+struct InFile<T> {
+  using type = std::underlying_type_t<T>;
+};
+template <>
+struct InFile<bool> {
+  using type = std::uint8_t;
+};
+}  // namespace detail
+
+/// The number that stands in a file for one of this type.
+template <PlainNumber T>
+using InFile = typename detail::InFile<T>::type;
 
 class Writer {
 public:
@@ -52,12 +56,14 @@ public:
   void operator()(T&... values) {
     (put(values), ...);
   }
-  [[nodiscard]] const std::string& bytes() const noexcept { return bytes_; }
+  [[nodiscard]] std::string file(std::string_view kind, std::uint64_t version) const {
+    return out_.file(kind, version);
+  }
 
 private:
   template <PlainNumber T>
   void put(const T& number) {
-    bytes_.append(reinterpret_cast<const char*>(&number), sizeof number);
+    out_.put(static_cast<InFile<T>>(number));
   }
   template <class T>
   void put(std::vector<T>& values) {
@@ -83,37 +89,35 @@ private:
     parts(*this, value);
   }
 
-  std::string bytes_;
+  cairn::BinaryWriter out_;
 };
 
-/// Throws cairn::Error, naming the file, where the bytes end before the values do.
+/// Throws cairn::Error, naming the file, for what is no such file, is damaged, or ends before the values do.
 class Reader {
 public:
   static constexpr bool reads = true;
 
-  Reader(std::string_view bytes, std::string name) : rest_(bytes), name_(std::move(name)) {}
+  Reader(std::string_view bytes, std::string_view kind, std::uint64_t version, std::string name)
+      : in_(bytes, kind, version, std::move(name)) {}
 
   template <class... T>
   void operator()(T&... values) {
     (take(values), ...);
   }
-  [[nodiscard]] bool at_end() const noexcept { return rest_.empty(); }
-  [[noreturn]] void refuse(const std::string& why) const { cairn::raise(name_ + ": " + why); }
+  void expect_end() const { in_.expect_end(); }
+  [[noreturn]] void refuse(const std::string& why) const { cairn::raise(in_.name() + ": " + why); }
 
 private:
   template <PlainNumber T>
   void take(T& number) {
-    if (rest_.size() < sizeof number) refuse("the map ends too early");
-    std::memcpy(&number, rest_.data(), sizeof number);
-    rest_.remove_prefix(sizeof number);
+    number = static_cast<T>(in_.get<InFile<T>>());
   }
   template <class T>
   void take(std::vector<T>& values) {
-    std::uint64_t size = 0;
-    take(size);
-    if (size > rest_.size()) refuse("the map ends too early");  // nothing is smaller than a byte
+    constexpr std::size_t least_bytes = 1;
+    const auto size = in_.count<std::uint64_t>(least_bytes);
     values.clear();
-    for (std::uint64_t i = 0; i < size; ++i) take(values.emplace_back());
+    for (std::size_t i = 0; i < size; ++i) take(values.emplace_back());
   }
   template <class T>
   void take(std::optional<T>& value) {
@@ -137,8 +141,7 @@ private:
     parts(*this, value);
   }
 
-  std::string_view rest_;
-  std::string name_;
+  cairn::BinaryReader in_;
 };
 
 template <class Archive>

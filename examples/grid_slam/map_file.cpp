@@ -80,7 +80,8 @@ void parts(Archive& archive, Loop& l) {
 
 namespace {
 
-constexpr std::string_view mark = "cairn grid_slam map 1\n";
+constexpr std::string_view kind = "cairngrd";
+constexpr std::uint64_t version = 1;
 
 /// Grids that share tiles: every tile once, and for each grid the numbers of its own.
 template <class Cell>
@@ -154,26 +155,12 @@ void Mapper::save(const std::filesystem::path& path) const {
   writer(options.cell_size, options.field_radius, options.model, options.particles, options.seed, record,
          cells, fields);
   plain_parts(writer, copy);
-  std::uint64_t sum = sum_of(writer.bytes());
-  Writer tail;
-  tail(sum);
-  cairn::write_file_atomically(path, std::string(mark) + writer.bytes() + tail.bytes());
+  cairn::write_file_atomically(path, writer.file(kind, version));
 }
 
 Mapper Mapper::loaded(const std::filesystem::path& path, const MapRequest& wanted) {
   const std::string bytes = cairn::read_file(path, "a map of grid_slam");
-  const std::string name = path.string();
-  std::string_view rest = bytes;
-  if (!rest.starts_with(mark)) Reader(rest, name).refuse("expected a map that grid_slam --save wrote");
-  rest.remove_prefix(mark.size());
-  std::uint64_t sum = 0;
-  if (rest.size() < sizeof sum) Reader(rest, name).refuse("the map ends too early");
-  Reader tail(rest.substr(rest.size() - sizeof sum), name);
-  tail(sum);
-  rest.remove_suffix(sizeof sum);
-  if (sum != sum_of(rest))
-    Reader(rest, name).refuse("the map is damaged or ends too early: its sum is wrong");
-  Reader reader(rest, name);
+  Reader reader(bytes, kind, version, path.string());
   MapperOptions options;
   cairn::PathsRecord<cairn::SE2> record;
   TileStore<cairn::OccupancyCell> cells;
@@ -190,7 +177,7 @@ Mapper Mapper::loaded(const std::filesystem::path& path, const MapRequest& wante
   options.threads = wanted.threads;
   Mapper mapper(options);
   plain_parts(reader, mapper);
-  if (!reader.at_end()) reader.refuse("expected the map's end, found more");
+  reader.expect_end();
   auto cell_grids = cells.grids(reader);
   auto field_grids = fields.grids(reader);
   if (cell_grids.size() != field_grids.size()) reader.refuse("the map has cells without a distance field");

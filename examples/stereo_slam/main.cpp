@@ -91,10 +91,9 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
       ->check(example::number_between(-5, 5))
       ->capture_default_str();
   app.add_flag("!--no-cache", arguments.dataset.arena.cache, "arena: do not keep rendered images on disk");
-  app.add_option("--save-map", arguments.save_map, "write the map for another run into FILE")
-      ->type_name("FILE");
+  app.add_option("--save", arguments.save_map, "write the map for another run into FILE")->type_name("FILE");
   CLI::Option* const map =
-      app.add_option("--map", arguments.map, "begin in the map of an earlier run and go on with it")
+      app.add_option("--load", arguments.map, "begin in the map of an earlier run and go on with it")
           ->type_name("FILE");
   app.add_flag("--localise", arguments.pipeline.localise, "leave that map as it is")->needs(map);
   app.add_option("--dump", arguments.dump, "write the frames as a KITTI odometry sequence into DIR and stop")

@@ -131,8 +131,8 @@ TEST_SUITE("program") {
   TEST_CASE("stereo_slam: a run goes on in the map of another, and what is no map is refused before work") {
     const cairn_test::Folder folder;
     const auto named = [&](const char* name) { return "\"" + (folder / name).string() + "\""; };
-    REQUIRE(run("--frames 4 --save-map " + named("map") + " --out " + named("first")).code == 0);
-    REQUIRE(run("--frames 4 --map " + named("map") + " --localise --save-map " + named("same") + " --out " +
+    REQUIRE(run("--frames 4 --save " + named("map") + " --out " + named("first")).code == 0);
+    REQUIRE(run("--frames 4 --load " + named("map") + " --localise --save " + named("same") + " --out " +
                 named("second"))
                 .code == 0);
     CHECK(summary_in(folder / "second")["relocalisations"] == 1);
@@ -142,7 +142,7 @@ TEST_SUITE("program") {
     CHECK(run("--localise --out " + named("third")).code == 2);
     tear(folder / "map");
     for (const char* bad : {"map", "none"}) {
-      const Outcome outcome = run("--frames 4 --map " + named(bad) + " --out " + named("third"));
+      const Outcome outcome = run("--frames 4 --load " + named(bad) + " --out " + named("third"));
       CHECK(outcome.code == 2);
       CHECK(outcome.says((folder / bad).string() + ": "));
     }
