@@ -79,7 +79,7 @@ example::PlaneCurve curve_of(std::string name, Ink ink, const std::vector<Vector
                              const cairn::SE2& T, bool dots = false) {
   // More points than a page has pixels only make it slow.
   const std::size_t every = dots ? 1 : std::max<std::size_t>(1, places.size() / 4000);
-  example::PlaneCurve curve{std::move(name), ink, {}, {}, dots};
+  example::PlaneCurve curve{.name = std::move(name), .ink = ink, .dots = dots};
   for (std::size_t k = 0; k < places.size(); k += every) {
     const Vector<2> p = T * places[k];
     curve.x.push_back(p(0));
@@ -90,7 +90,7 @@ example::PlaneCurve curve_of(std::string name, Ink ink, const std::vector<Vector
 
 /// Two standard deviations around every landmark, one line with gaps.
 example::PlaneCurve ellipses(const std::vector<FoundLandmark>& landmarks, const cairn::SE2& T) {
-  example::PlaneCurve curve{"landmarks, 2 sigma", Ink::belief, {}, {}, false};
+  example::PlaneCurve curve{.name = "landmarks, 2 sigma", .ink = Ink::teal};
   for (const FoundLandmark& l : landmarks) {
     const auto& p = l.belief.covariance;
     const double a = std::sqrt(p(0, 0)), b = p(0, 1) / a, c = std::sqrt(std::max(0.0, p(1, 1) - b * b));
@@ -170,25 +170,42 @@ void add_steps(example::Report& page, const Results& r) {
       .logarithmic = true});
 }
 
-void add_snapshots(example::Report& page, const Results& r) {
+/// A line from each of the paths to the next, with gaps.
+example::PlaneCurve together(const std::string& name, Ink ink,
+                             const std::vector<std::vector<Vector<2>>>& paths, const cairn::SE2& T) {
+  example::PlaneCurve all{.name = name, .ink = ink};
+  for (const auto& path : paths) {
+    const example::PlaneCurve one = curve_of(name, ink, path, T);
+    all.x.insert(all.x.end(), one.x.begin(), one.x.end());
+    all.y.insert(all.y.end(), one.y.begin(), one.y.end());
+    all.x.push_back(std::nan(""));
+    all.y.push_back(std::nan(""));
+  }
+  return all;
+}
+
+void add_film(example::Report& page, const Results& r) {
   if (r.snapshots.empty()) return;
-  // Where paths have an ancestor in common they lie on each other: as many lines as there are distinct ones.
-  const Snapshot& last = r.snapshots[r.snapshots.size() / 2];
-  example::PlanePlot plot{
-      .title = "Particles half-way",
+  const cairn::SE2 T = into_truth(r);
+  example::PlaneFilm film{
+      .title = "Particles and their landmarks over time",
       .caption =
-          "Every particle's path when half of the log was done: they coalesce into one a little while back. "
-          "Before that the filter has made up its mind.",
+          "The paths of a dozen particles, and the best one's landmarks with ellipses of two standard "
+          "deviations. A little while back the paths lie on each other: all particles but one have died out "
+          "there, and the filter has made up its mind.",
       .x = {"x", "m"},
       .y = {"y", "m"},
-      .curves = {}};
-  for (const auto& path : last.paths) {
-    std::vector<Vector<2>> places;
-    for (const cairn::SE2& pose : path) places.push_back(pose.translation());
-    plot.curves.push_back(curve_of("particles", Ink::violet, places, {}));
-  }
-  plot.curves.push_back(ellipses(last.landmarks, {}));
-  page.add(plot);
+      .slider = {"time", "s"},
+      .wide = true};
+  if (!r.true_landmarks.empty())
+    film.still.push_back(curve_of("true landmarks", Ink::truth, r.true_landmarks, {}, true));
+  for (const Snapshot& s : r.snapshots)
+    film.frames.push_back(
+        {s.time - r.steps.front().time,
+         std::to_string(s.landmarks.size()) + " landmarks",
+         {together("particles", Ink::violet, s.paths, T),
+          together("best particle", Ink::belief, {s.paths.front()}, T), ellipses(s.landmarks, T)}});
+  page.add(film);
 }
 
 }  // namespace
@@ -227,7 +244,7 @@ std::optional<std::string> report(const Results& r) {
   if (r.landmark_error)
     page.figure({"Landmarks' error", readable(*r.landmark_error), "m", "root mean square after a rigid fit"});
   add_map(page, r);
-  add_snapshots(page, r);
+  add_film(page, r);
   add_steps(page, r);
   return page.html();
 }

@@ -57,13 +57,21 @@ std::vector<FoundLandmark> landmarks_of(const Map& map) {
   return found;
 }
 
+/// Every so-manieth place of a particle's path, from the newest back.
+std::vector<Vector<2>> thinned_path(const Belief& belief, std::size_t particle) {
+  const auto path = belief.path(particle);
+  const std::size_t every = path.size() / 300 + 1;
+  std::vector<Vector<2>> places;
+  for (std::size_t back = 0; back < path.size(); back += every)
+    places.push_back(path[path.size() - 1 - back].pose.translation());
+  return places;
+}
+
 Snapshot snapshot_of(const Belief& belief, double time) {
-  Snapshot s{time, {}, landmarks_of(belief[belief.best()].map)};
-  for (std::size_t i = 0; i < belief.size(); ++i) {
-    if (i > 0 && belief[i].node == belief[i - 1].node) continue;  // the same path
-    auto& path = s.paths.emplace_back();
-    for (const auto& pose : belief.path(i)) path.push_back(pose.pose);
-  }
+  constexpr std::size_t most_paths = 12;
+  Snapshot s{time, {thinned_path(belief, belief.best())}, landmarks_of(belief[belief.best()].map)};
+  for (std::size_t i = 1; i < belief.size() && s.paths.size() < most_paths; ++i)
+    if (belief[i].node != belief[i - 1].node) s.paths.push_back(thinned_path(belief, i));
   return s;
 }
 

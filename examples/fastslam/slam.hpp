@@ -56,8 +56,9 @@ struct FoundLandmark {
 /// What there was to see at a moment.
 struct Snapshot {
   double time = 0;
-  std::vector<std::vector<cairn::SE2>> paths{};  ///< of distinct particles
-  std::vector<FoundLandmark> landmarks{};        ///< of the best
+  std::vector<std::vector<cairn::Vector<2>>>
+      paths{};                             ///< of a few distinct particles, thinned; the best first
+  std::vector<FoundLandmark> landmarks{};  ///< of the best
 };
 
 struct Results {

@@ -91,6 +91,8 @@ enum class Pick {
 struct LandmarkOptions {
   Pick pick = Pick::likeliest;
   double gate = 0.99;  ///< share of a landmark's sightings that are inside its gate
+  /// The same for sightings with an identity; 1: what is said to be a landmark is taken for it, wherever.
+  double gate_of_named = 1;
   /// Densities of a sighting that is of no landmark of the map, over the space of measurements: of one that
   /// is new, and of clutter. Sightings with an identity are never taken for new where it is known.
   double new_density = 1e-3;
@@ -103,9 +105,10 @@ struct LandmarkOptions {
 
   [[nodiscard]] bool valid() const noexcept {
     const auto is_share = [](double v) { return v > 0 && v < 1; };
-    return is_share(gate) && is_share(false_share) && new_density > 0 && clutter_density > 0 && seen >= 0 &&
-           remove_below < 0 && most_log_odds > 0 && filing_distance > 0 && std::isfinite(new_density) &&
-           std::isfinite(clutter_density) && std::isfinite(seen) && std::isfinite(filing_distance);
+    return is_share(gate) && gate_of_named > 0 && gate_of_named <= 1 && is_share(false_share) &&
+           new_density > 0 && clutter_density > 0 && seen >= 0 && remove_below < 0 && most_log_odds > 0 &&
+           filing_distance > 0 && std::isfinite(new_density) && std::isfinite(clutter_density) &&
+           std::isfinite(seen) && std::isfinite(filing_distance);
   }
 };
 
@@ -177,8 +180,9 @@ public:
 
   /// An empty map. Throws Error where an option is out of its range.
   explicit LandmarkMap(L sensor = {}, const LandmarkOptions& options = {})
-      : common_(std::make_shared<const Common>(Common{
-            std::move(sensor), options, chi_square_quantile(checked(options).gate, dof<Measurement>)})) {}
+      : common_(std::make_shared<const Common>(Common{std::move(sensor), checked(options),
+                                                      squared_gate(options.gate),
+                                                      squared_gate(options.gate_of_named)})) {}
 
   [[nodiscard]] const L& sensor() const noexcept { return common_->sensor; }
   [[nodiscard]] const LandmarkOptions& options() const noexcept { return common_->options; }
@@ -235,14 +239,19 @@ private:
   struct Common {
     L sensor;
     LandmarkOptions options;
-    double gate;
+    double gate, gate_of_named;  // of squared Mahalanobis distances
   };
   struct Candidate {
-    std::uint32_t landmark;
-    double log_density;
+    std::uint32_t landmark = no_landmark;
+    double log_density = 0;
   };
-  /// What a sighting may be of; the last is no landmark of the map.
-  using Candidates = std::vector<std::vector<Candidate>>;
+  /// What a sighting may be of: one of these or, where it has no name or that one is taken, something else.
+  struct Alternatives {
+    std::vector<Candidate> known{};
+    Candidate otherwise{};
+    bool is_named = false;
+  };
+  using Candidates = std::vector<Alternatives>;
 
   static constexpr int places = detail::place_size<Landmark>;
   static constexpr bool is_placed = places > 0;
@@ -251,12 +260,15 @@ private:
     if (!options.valid()) raise("LandmarkMap: expected options within their ranges");
     return options;
   }
+  static double squared_gate(double share) {
+    return share < 1 ? chi_square_quantile(share, dof<Measurement>) : std::numeric_limits<double>::infinity();
+  }
   static Gaussian<Pose> known(const Pose& x) { return {x, CovarianceOf<Pose>::Zero(dof_of(x), dof_of(x))}; }
 
   [[nodiscard]] Candidates candidates_of(const Gaussian<Pose>& x, const Observation& z) const;
   void check(const Observation& z) const;
   [[nodiscard]] std::optional<Candidate> candidate(const Gaussian<Pose>& x, const Measurement& z,
-                                                   std::uint32_t number) const;
+                                                   std::uint32_t number, double gate) const;
   template <class Visit>
   void for_each_near(const Gaussian<Pose>& x, const Measurement& z, Visit&& visit) const;
   [[nodiscard]] Chosen<Choice> likeliest(const Candidates& candidates) const;
@@ -363,8 +375,8 @@ void LandmarkMap<L>::check(const Observation& z) const {
 
 /// The sighting as one of this landmark; nothing where it lies outside the gate.
 template <LandmarkSensor L>
-auto LandmarkMap<L>::candidate(const Gaussian<Pose>& x, const Measurement& z, std::uint32_t number) const
-    -> std::optional<Candidate> {
+auto LandmarkMap<L>::candidate(const Gaussian<Pose>& x, const Measurement& z, std::uint32_t number,
+                               double gate) const -> std::optional<Candidate> {
   const detail::SensorOfPose<L> sensor{common_->sensor, find(number)->belief};
   const auto h = detail::dense_of(sensor.jacobian(x.mean));
   Innovation<dof<Measurement>, ScalarOf<Measurement>> in;
@@ -374,7 +386,7 @@ auto LandmarkMap<L>::candidate(const Gaussian<Pose>& x, const Measurement& z, st
   const Cholesky<dof<Measurement>> root(in.covariance);
   if (!root.good()) return std::nullopt;
   in.nis = root.whiten(in.residual).squaredNorm();
-  if (!(in.nis <= common_->gate)) return std::nullopt;
+  if (!(in.nis <= gate)) return std::nullopt;
   return Candidate{number, in.log_likelihood()};
 }
 
@@ -383,22 +395,23 @@ auto LandmarkMap<L>::candidates_of(const Gaussian<Pose>& x, const Observation& z
   check(z);
   Candidates all(z.size());
   for (std::size_t k = 0; k < z.size(); ++k) {
+    Alternatives& of = all[k];
+    of.is_named = z[k].identity.has_value();
+    const double gate = of.is_named ? common_->gate_of_named : common_->gate;
     const auto add = [&](std::uint32_t number) {
-      if (const auto found = candidate(x, z[k].z, number)) all[k].push_back(*found);
+      if (const auto found = candidate(x, z[k].z, number, gate)) of.known.push_back(*found);
     };
-    std::uint32_t otherwise = new_landmark;
-    if (!z[k].identity) {
-      for_each_near(x, z[k].z, add);
-    } else if (find(*z[k].identity)) {
+    const bool is_of_the_map = of.is_named && find(*z[k].identity) != nullptr;
+    if (is_of_the_map)
       add(*z[k].identity);
-      otherwise = no_landmark;
-    }
-    if (otherwise == new_landmark && options().new_density < options().clutter_density)
-      otherwise = no_landmark;
+    else if (!of.is_named)
+      for_each_near(x, z[k].z, add);
+    const bool is_new = !is_of_the_map && (of.is_named || options().new_density >= options().clutter_density);
+    of.otherwise.landmark = is_new ? new_landmark : no_landmark;
+    of.otherwise.log_density = log_density_of(of.otherwise.landmark);
     // Candidates come in the order of the index, which depends on its history.
-    std::sort(all[k].begin(), all[k].end(),
+    std::sort(of.known.begin(), of.known.end(),
               [](const Candidate& a, const Candidate& b) { return a.landmark < b.landmark; });
-    all[k].push_back({otherwise, log_density_of(otherwise)});
   }
   return all;
 }
@@ -436,25 +449,28 @@ void LandmarkMap<L>::for_each_near(const Gaussian<Pose>& x, const Measurement& z
 template <LandmarkSensor L>
 Chosen<Association> LandmarkMap<L>::likeliest(const Candidates& candidates) const {
   std::vector<std::uint32_t> columns;
-  for (const auto& of_sighting : candidates)
-    for (std::size_t i = 0; i + 1 < of_sighting.size(); ++i) columns.push_back(of_sighting[i].landmark);
+  for (const Alternatives& of : candidates)
+    for (const Candidate& c : of.known) columns.push_back(c.landmark);
   std::sort(columns.begin(), columns.end());
   columns.erase(std::unique(columns.begin(), columns.end()), columns.end());
   const std::size_t rows = candidates.size(), width = columns.size() + rows;
   std::vector<double> costs(rows * width, std::numeric_limits<double>::infinity());
   for (std::size_t k = 0; k < rows; ++k) {
-    for (std::size_t i = 0; i + 1 < candidates[k].size(); ++i) {
-      const auto at = std::lower_bound(columns.begin(), columns.end(), candidates[k][i].landmark);
-      costs[k * width + static_cast<std::size_t>(at - columns.begin())] = -candidates[k][i].log_density;
+    for (const Candidate& c : candidates[k].known) {
+      const auto at = std::lower_bound(columns.begin(), columns.end(), c.landmark);
+      costs[k * width + static_cast<std::size_t>(at - columns.begin())] = -c.log_density;
     }
-    costs[k * width + columns.size() + k] = -candidates[k].back().log_density;
+    constexpr double only_if_taken = 1e9;
+    const bool has_name = candidates[k].is_named && !candidates[k].known.empty();
+    costs[k * width + columns.size() + k] = has_name ? only_if_taken : -candidates[k].otherwise.log_density;
   }
   const auto assigned = best_assignment(costs, rows);
   Chosen<Association> result;
   for (std::size_t k = 0; k < rows; ++k) {
     const std::size_t column = (*assigned)[k];
-    result.choice.push_back(column < columns.size() ? columns[column] : candidates[k].back().landmark);
-    result.log_likelihood -= costs[k * width + column];
+    const bool is_known = column < columns.size();
+    result.choice.push_back(is_known ? columns[column] : candidates[k].otherwise.landmark);
+    result.log_likelihood += is_known ? -costs[k * width + column] : candidates[k].otherwise.log_density;
   }
   return result;
 }
@@ -465,14 +481,13 @@ Chosen<Association> LandmarkMap<L>::drawn(const Candidates& candidates, Random& 
   const auto taken = [&](std::uint32_t landmark) {
     return std::find(result.choice.begin(), result.choice.end(), landmark) != result.choice.end();
   };
-  for (const auto& of_sighting : candidates) {
+  for (const Alternatives& of : candidates) {
     std::vector<Candidate> free;
+    for (const Candidate& c : of.known)
+      if (!taken(c.landmark)) free.push_back(c);
+    if (!of.is_named || free.empty()) free.push_back(of.otherwise);
     std::vector<double> log_densities;
-    for (const Candidate& c : of_sighting)
-      if (&c == &of_sighting.back() || !taken(c.landmark)) {
-        free.push_back(c);
-        log_densities.push_back(c.log_density);
-      }
+    for (const Candidate& c : free) log_densities.push_back(c.log_density);
     const double total = log_sum_exp(log_densities);
     double left = random.uniform();
     std::size_t i = 0;
