@@ -224,7 +224,6 @@ std::string summary(const Results& r) {
   json["path_rms_m"] = json_of(r.path_error);
   json["odometry_rms_m"] = json_of(r.odometry_error);
   json["landmarks_rms_m"] = json_of(r.landmark_error);
-  json["node_copies"] = r.node_copies;
   json["notes"] = r.notes;
   json["ended_early"] = r.ended_early ? Json(*r.ended_early) : Json(nullptr);
   return json.dump(2) + "\n";
@@ -255,7 +254,10 @@ void prepare_folder(const std::filesystem::path& folder) {
 
 std::optional<std::string> write_outputs(const Results& r, const std::filesystem::path& folder) {
   const std::optional<std::string> page = report(r);
-  const Json timing{{"threads", r.threads}, {"seconds", r.seconds}, {"cpu_seconds", r.cpu_seconds}};
+  const Json timing{{"threads", r.threads},
+                    {"seconds", r.seconds},
+                    {"cpu_seconds", r.cpu_seconds},
+                    {"node_copies", r.node_copies}};
   results_in(folder).replace([&](const std::filesystem::path& staging) {
     cairn::write_file_atomically(staging / "trajectory.txt", tum(r.mean));
     cairn::write_file_atomically(staging / "landmarks.csv", csv(r.landmarks));

@@ -75,7 +75,7 @@ struct Results {
   std::vector<FoundLandmark> landmarks{};
   std::vector<cairn::Vector<2>> true_landmarks{};  ///< all
   std::vector<Snapshot> snapshots{};
-  std::size_t node_copies = 0;  ///< of the best particle's map, along its ancestry
+  std::size_t node_copies = 0;  ///< of the best particle's map; with several threads not always the same
   /// Root mean square after the rigid motion that fits the path best to the truth [m]; of the landmarks, by
   /// identity where it is known, else to the nearest true one, after the motion that fits them best.
   std::optional<double> path_error{}, odometry_error{}, landmark_error{};

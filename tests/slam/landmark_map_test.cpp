@@ -390,8 +390,9 @@ TEST_SUITE("slam/landmark_map") {
 
   TEST_CASE("landmark_map: a named landmark outside its gate is clutter, and none is seen twice at once") {
     Random random(1);
-    Map map({}, {.gate = 0.99});
+    Map map({}, {.gate_of_named = 0.99});
     map.insert(Plane::Zero(), {{Plane(1, 0), 7}});
+    CHECK(Map().choose(Plane::Zero(), {{Plane(4, 0), 7}}, random).choice == Association{new_landmark});
     CHECK(map.find(7) != nullptr);
     CHECK(map.choose(Plane::Zero(), {{Plane(4, 0), 7}}, random).choice == Association{no_landmark});
     const auto twice = map.choose(Plane::Zero(), {{Plane(1.1, 0), 7}, {Plane(1, 0), 7}}, random).choice;
@@ -401,6 +402,9 @@ TEST_SUITE("slam/landmark_map") {
     map.insert(Plane::Zero(), {{Plane(5, 0), 9}, {Plane(5, 0), 9}});
     CHECK(map.find(9)->sightings == 1);
     CHECK(map.size() == 2);
+    Map trusting;  // takes a name for true, wherever the landmark is seen
+    trusting.insert(Plane::Zero(), {{Plane(1, 0), 7}});
+    CHECK(trusting.choose(Plane::Zero(), {{Plane(90, 0), 7}}, random).choice == Association{7});
   }
 
   TEST_CASE("landmark_map: the same bytes for 1, 2 and 7 threads") {

@@ -97,7 +97,7 @@ struct LandmarkOptions {
   /// is new, and of clutter. Sightings with an identity are never taken for new where it is known.
   double new_density = 1e-3;
   double clutter_density = 1e-4;
-  double seen = 0.85;            ///< added to a landmark's log odds by a sighting
+  double seen = 0.85;            ///< added to a landmark's log odds by a sighting, at least
   double false_share = 0.05;     ///< probability that what is no landmark is seen again
   double remove_below = -1;      ///< log odds; -infinity keeps all
   double most_log_odds = 8;      ///< what has been seen a thousand times can still go
@@ -199,7 +199,8 @@ public:
     for (std::uint32_t n = 0; n < landmarks_.size(); ++n)
       if (const auto* landmark = find(n)) visit(n, *landmark);
   }
-  /// Nodes that changes of this map have copied because other maps held them.
+  /// Nodes that changes of this map have copied because other maps held them. Of several maps that write to
+  /// the same nodes on different threads it is not said which copies.
   [[nodiscard]] std::size_t node_copies() const noexcept {
     if constexpr (is_placed)
       return landmarks_.node_copies() + places_.tree.node_copies() + places_.filed.node_copies();
@@ -280,6 +281,7 @@ private:
   void remove(std::uint32_t number);
   void miss(const Pose& x, const Choice& seen);
   [[nodiscard]] std::vector<std::uint32_t> in_view(const Pose& x) const;
+  [[nodiscard]] double gained_odds(const Pose& x, const Landmark& m) const;
   [[nodiscard]] double certain_detection(const Pose& x, const Gaussian<Landmark>& landmark) const;
   void file(std::uint32_t number, bool is_new);
 
@@ -544,7 +546,8 @@ void LandmarkMap<L>::update(const Pose& x, const Measurement& z, std::uint32_t n
   const auto in = Extended{}.update(landmark.belief, detail::HeldSensor<L>{common_->sensor, x}, z);
   if (!in.accepted()) return;
   ++landmark.sightings;
-  landmark.log_odds = std::min(landmark.log_odds + options().seen, options().most_log_odds);
+  landmark.log_odds =
+      std::min(landmark.log_odds + gained_odds(x, landmark.belief.mean), options().most_log_odds);
   file(number, false);
 }
 
@@ -571,7 +574,7 @@ void LandmarkMap<L>::add(const Pose& x, const Sighting& sighting) {
   if (!landmark) return;
   const auto number = sighting.identity.value_or(static_cast<std::uint32_t>(landmarks_.size()));
   if (find(number) != nullptr) return;  // named twice in one observation
-  landmarks_.write(number) = {*landmark, options().seen, 1};
+  landmarks_.write(number) = {*landmark, gained_odds(x, landmark->mean), 1};
   ++size_;
   file(number, true);
 }
@@ -600,6 +603,15 @@ void LandmarkMap<L>::file(std::uint32_t number, bool is_new) {
     places_.tree.insert(at, number);
     places_.filed.write(number) = at;
   }
+}
+
+/// What a sighting adds to the log odds: how much more likely it is of a landmark than of none.
+template <LandmarkSensor L>
+double LandmarkMap<L>::gained_odds(const Pose& x, const Landmark& m) const {
+  double detected = 0;
+  if constexpr (requires(const L& l) { l.detection_probability(x, m); })
+    detected = common_->sensor.detection_probability(x, m);
+  return std::max(options().seen, std::log(detected / options().false_share));
 }
 
 /// Whatever was surely in view and not seen is less likely to be there.
