@@ -137,4 +137,19 @@ BatchOptimum batch_optimum(const LandmarkLog& log, const std::vector<SE2>& start
   return best;
 }
 
+BatchOptimum growing_batch_optimum(const LandmarkLog& log, std::size_t by) {
+  LandmarkLog part{.name = log.name, .sensor = log.sensor};
+  BatchOptimum best;
+  while (part.frames.size() < log.frames.size()) {
+    const std::size_t end = std::min(part.frames.size() + std::max<std::size_t>(1, by), log.frames.size());
+    for (std::size_t k = part.frames.size(); k < end; ++k) {
+      part.frames.push_back(log.frames[k]);
+      const SE2& moved = log.frames[k].moved.mean;
+      best.poses.push_back(best.poses.empty() ? moved : best.poses.back() * moved);
+    }
+    best = batch_optimum(part, best.poses);
+  }
+  return best;
+}
+
 }  // namespace fastslam

@@ -6,6 +6,7 @@
 /// where there is no truth.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <vector>
@@ -29,5 +30,9 @@ struct BatchOptimum {
 /// The first frame's motion starts at the identity. Sightings without an identity do not count. Throws
 /// cairn::Error where there are not as many poses as frames, or a motion's covariance is singular.
 [[nodiscard]] BatchOptimum batch_optimum(const LandmarkLog& log, const std::vector<cairn::SE2>& start);
+
+/// The same of the log's first frames and then of more and more, each begun where the last ended and moved on
+/// by odometry: no start is needed, and drift does not grow before a loop corrects it.
+[[nodiscard]] BatchOptimum growing_batch_optimum(const LandmarkLog& log, std::size_t by = 50);
 
 }  // namespace fastslam

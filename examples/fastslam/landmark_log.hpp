@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -43,7 +44,8 @@ struct LandmarkLog {
   std::vector<Between> between{};
   std::vector<cairn::StampedPose2> truth{};               ///< by growing times; none where it is not known
   std::map<std::uint32_t, cairn::Vector<2>> landmarks{};  ///< true ones by identity
-  std::vector<std::string> notes{};                       ///< what was left out
+  std::optional<cairn::SE2> start{};  ///< true pose before the first frame, where it is known
+  std::vector<std::string> notes{};   ///< what was left out
 
   /// Forgets which landmarks were seen.
   void withhold_identities() {

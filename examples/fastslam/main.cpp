@@ -31,7 +31,7 @@ using namespace fastslam;
 
 struct Options {
   std::string data = "loop", name, folder, identities = "known", proposal = "landmarks",
-              association = "likeliest";
+              association = "drawn";
   int robot = 1;
   std::size_t frames = 500;
   std::filesystem::path out = "fastslam_out";

@@ -107,6 +107,7 @@ LandmarkLog simulated(const PointMap& map, std::uint64_t seed, std::size_t frame
   cairn::Random random(seed, 29);
   const Vector<2> to_first = map.way[map.way.size() > 1 ? 1 : 0] - map.way[0];
   SE2 is(map.way[0](0), map.way[0](1), std::atan2(to_first(1), to_first(0)));
+  log.start = is;
   Driver driver(map.way);
   for (std::size_t k = 0; k < frames; ++k) {
     Frame frame{period * static_cast<double>(k + 1), {SE2(), cairn::Matrix<3>::Zero()}, {}};

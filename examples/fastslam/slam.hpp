@@ -33,7 +33,7 @@ struct SlamOptions {
   unsigned threads = 1;
   ProposalKind proposal = ProposalKind::landmarks;
   double resample_below = 0.5;
-  cairn::LandmarkOptions landmarks{.pick = cairn::Pick::likeliest, .gate = 0.999};
+  cairn::LandmarkOptions landmarks{.pick = cairn::Pick::drawn, .gate = 0.999};
 };
 
 struct StepRecord {

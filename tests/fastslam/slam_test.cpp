@@ -11,9 +11,11 @@
 
 #include <doctest/doctest.h>
 
-#include <cairn/core/random.hpp>
+#include <cairn/core/statistics.hpp>
+#include <cairn/filter/gaussian.hpp>
 
 #include "batch.hpp"
+#include "ekf_slam.hpp"
 #include "support/data.hpp"
 #include "support/folder.hpp"
 #include "support/random.hpp"
@@ -83,6 +85,7 @@ TEST_SUITE("fastslam/slam") {
     CHECK(best.converged);
     const BatchOptimum again = batch_optimum(log, truth);
     CHECK(again.cost == doctest::Approx(best.cost).epsilon(1e-6));
+    CHECK(growing_batch_optimum(log, 25).cost == doctest::Approx(best.cost).epsilon(1e-6));
     // twice the cost is chi-square of numbers seen and moved, less those estimated
     double numbers = 0;
     for (const Frame& frame : log.frames) numbers += 2.0 * static_cast<double>(frame.seen.size());
@@ -97,6 +100,24 @@ TEST_SUITE("fastslam/slam") {
       sum += (path[k].translation() - best.poses[k].translation()).squaredNorm();
     CHECK(std::sqrt(sum / static_cast<double>(path.size())) < 0.3);
     CHECK_THROWS_AS(static_cast<void>(batch_optimum(log, {})), cairn::Error);
+  }
+
+  TEST_CASE("fastslam: with the start known NEES is about its number of dimensions, for both filters") {
+    cairn::RunningMoments particles, joint;
+    for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+      const LandmarkLog log = simulated(loop_map(), seed, 80);
+      const Results r = run(log, {.particles = 100, .seed = seed});
+      const EkfSlamRun ekf = ekf_slam(log);
+      for (std::size_t k = 19; k < 80; k += 20) {
+        particles.add(*r.steps[k].nees);
+        joint.add(cairn::nees(ekf.poses[k], log.start->inverse() * log.truth[k].pose));
+      }
+    }
+    MESSAGE("FastSLAM ", particles.mean(), ", EKF-SLAM ", joint.mean());
+    for (const auto* nees : {&particles, &joint}) {
+      CHECK(nees->mean() > 1.2);
+      CHECK(nees->mean() < 6);
+    }
   }
 
   TEST_CASE("fastslam: the log of a robot is read, and what belongs to nothing is said") {
