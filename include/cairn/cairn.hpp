@@ -6,8 +6,10 @@
 /// door compiles in a fraction of the time (scripts/include_cost). Written by scripts/check_layers --write.
 #pragma once
 
+#include <cairn/core/assignment.hpp>
 #include <cairn/core/check.hpp>
 #include <cairn/core/cholesky.hpp>
+#include <cairn/core/counted.hpp>
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/parallel.hpp>
@@ -102,6 +104,8 @@
 #include <cairn/index/points.hpp>
 #include <cairn/index/principal_axes.hpp>
 #include <cairn/index/ratio_test.hpp>
+#include <cairn/index/shared_array.hpp>
+#include <cairn/index/shared_kd_tree.hpp>
 #include <cairn/index/tree_file.hpp>
 #include <cairn/io/binary_file.hpp>
 #include <cairn/io/carmen.hpp>
@@ -132,6 +136,7 @@
 #include <cairn/simd/shuffle.hpp>
 #include <cairn/slam/keyframe_map.hpp>
 #include <cairn/slam/keyframe_map_file.hpp>
+#include <cairn/slam/landmark_map.hpp>
 #include <cairn/slam/map_location.hpp>
 #include <cairn/slam/world_pose.hpp>
 #include <cairn/version.hpp>

@@ -10,12 +10,21 @@
 #include <doctest/doctest.h>
 
 #include <cairn/geometry/triangulation.hpp>
+#include <cairn/manifold/product.hpp>
+#include <cairn/manifold/se2.hpp>
+#include <cairn/manifold/so2.hpp>
 #include <cairn/slam/keyframe_map.hpp>
 #include <cairn/slam/keyframe_map_file.hpp>
+#include <cairn/slam/landmark_map.hpp>
 
 #include "slam/simulated_arena.hpp"
 
 namespace docs_slam_test {
+
+namespace landmark_map {
+#include "snippets/slam/landmark_map_1.inc"
+static_assert(cairn::LandmarkSensor<RangeBearingOfPoint>);
+}  // namespace landmark_map
 
 /// A frame whose association is known beforehand.
 struct Frame {

@@ -48,22 +48,66 @@ concept ConditionalMap =
       m.insert(x, z);
     };
 
+/// The choice of a map that has none to make.
+struct NoChoice {};
+
+namespace detail {
+
+template <class M>
+struct ChoiceOf {
+  using type = NoChoice;
+};
+template <class M>
+  requires requires { typename M::Choice; }
+struct ChoiceOf<M> {
+  using type = typename M::Choice;
+};
+
+}  // namespace detail
+
+/// What has to be decided of an observation besides the pose before a map can take it in: which landmark
+/// each sighting is of, say. A map that has such a thing names it M::Choice, with
+///   choose(x, z, random) -> Chosen<Choice>   and   insert(x, z, choice).
+/// The choice is a part of the sampled state: it is made once a step and particle, by the proposal.
+template <class M>
+using ChoiceOf = typename detail::ChoiceOf<M>::type;
+
+template <class M>
+concept ChoosingMap =
+    ConditionalMap<M> && std::default_initializable<ChoiceOf<M>> && std::copyable<ChoiceOf<M>> &&
+    requires(M& m, const typename M::Pose& x, const typename M::Observation& z, const ChoiceOf<M>& c) {
+      m.insert(x, z, c);
+    };
+
+/// A choice c that was made with probability q(c).
+template <class C>
+struct Chosen {
+  C choice{};
+  double log_likelihood = 0;   ///< log p(z, c | x, m)
+  double log_probability = 0;  ///< log q(c); 0 where the likeliest is taken, which is no draw
+};
+
 /// A pose that was drawn from q, with the weight that makes up for the difference to what it stands for:
 /// log_weight = log p(z | x, m) + log p(x | motion) - log q(x).
-template <Manifold X>
+template <Manifold X, class C = NoChoice>
 struct Proposed {
   X pose;
   Gaussian<X> drawn_from;  ///< q, or its moments; the motion where that was drawn from
   double log_weight = 0;
   double log_likelihood = 0;  ///< log p(z | x, m)
   std::size_t regime = 0;     ///< of the motion that the pose belongs to, where there are several
+  [[no_unique_address]] C choice{};
 };
+
+/// What a proposal for maps of this kind returns.
+template <class M>
+using ProposedOf = Proposed<typename M::Pose, ChoiceOf<M>>;
 
 /// How a pose is proposed from what the motion says and the observation.
 template <class P, class M, class Motion>
 concept Proposal = ConditionalMap<M> && requires(const P& propose, const M& map, const Motion& motion,
                                                  const typename M::Observation& z, Random& random) {
-  { propose(map, motion, z, random) } -> std::same_as<Proposed<typename M::Pose>>;
+  { propose(map, motion, z, random) } -> std::same_as<ProposedOf<M>>;
 };
 
 /// Logarithm of a Gaussian's density at x, by steps from its mean; -infinity where the covariance is not
@@ -96,33 +140,30 @@ struct FromMotion {
   std::size_t draws = 1;  ///< at least 1
 
   template <ConditionalMap M>
-  [[nodiscard]] Proposed<typename M::Pose> operator()(const M& map, const Gaussian<typename M::Pose>& motion,
-                                                      const typename M::Observation& z,
-                                                      Random& random) const {
+  [[nodiscard]] ProposedOf<M> operator()(const M& map, const Gaussian<typename M::Pose>& motion,
+                                         const typename M::Observation& z, Random& random) const {
     CAIRN_EXPECTS(draws > 0, "FromMotion needs at least one draw");
-    std::vector<typename M::Pose> poses;
-    std::vector<double> log_likelihoods;
+    if (draws == 1) return draw(map, motion, z, random);
+    std::vector<ProposedOf<M>> drawn;
+    std::vector<double> log_weights;
     for (std::size_t k = 0; k < draws; ++k) {
-      poses.push_back(sample(motion, random));
-      log_likelihoods.push_back(map.log_likelihood(poses.back(), z));
+      drawn.push_back(draw(map, motion, z, random));
+      log_weights.push_back(drawn.back().log_weight);
     }
-    if (draws == 1) return {std::move(poses[0]), motion, log_likelihoods[0], log_likelihoods[0], 0};
-    const double total = log_sum_exp(log_likelihoods);
+    const double total = log_sum_exp(log_weights);
     std::size_t chosen = 0;
     for (double left = random.uniform(); chosen + 1 < draws; ++chosen) {
-      const double share = std::exp(log_likelihoods[chosen] - total);
+      const double share = std::exp(log_weights[chosen] - total);
       if (!(left >= share)) break;  // also where no draw has a likelihood
       left -= share;
     }
-    return {std::move(poses[chosen]), motion, total - std::log(static_cast<double>(draws)),
-            log_likelihoods[chosen], 0};
+    drawn[chosen].log_weight = total - std::log(static_cast<double>(draws));
+    return std::move(drawn[chosen]);
   }
   /// The regime is drawn by its share first.
   template <ConditionalMap M>
-  [[nodiscard]] Proposed<typename M::Pose> operator()(const M& map,
-                                                      const RegimeMotion<typename M::Pose>& motion,
-                                                      const typename M::Observation& z,
-                                                      Random& random) const {
+  [[nodiscard]] ProposedOf<M> operator()(const M& map, const RegimeMotion<typename M::Pose>& motion,
+                                         const typename M::Observation& z, Random& random) const {
     CAIRN_EXPECTS(!motion.modes.empty(), "FromMotion needs a motion of at least one regime");
     double left = random.uniform();
     std::size_t chosen = 0;
@@ -131,6 +172,21 @@ struct FromMotion {
     auto proposed = (*this)(map, motion.modes[chosen].motion, z, random);
     proposed.regime = motion.modes[chosen].regime;
     return proposed;
+  }
+
+private:
+  template <ConditionalMap M>
+  [[nodiscard]] static ProposedOf<M> draw(const M& map, const Gaussian<typename M::Pose>& motion,
+                                          const typename M::Observation& z, Random& random) {
+    typename M::Pose pose = sample(motion, random);
+    if constexpr (ChoosingMap<M>) {
+      Chosen<ChoiceOf<M>> c = map.choose(pose, z, random);
+      const double log_weight = c.log_likelihood - c.log_probability;
+      return {std::move(pose), motion, log_weight, c.log_likelihood, 0, std::move(c.choice)};
+    } else {
+      const double log_likelihood = map.log_likelihood(pose, z);
+      return {std::move(pose), motion, log_likelihood, log_likelihood, 0, {}};
+    }
   }
 };
 
@@ -169,9 +225,10 @@ public:
   struct Particle {
     Pose pose;
     M map;
-    std::uint32_t node;       // of the path
-    double log_evidence = 0;  ///< sum of the log weights along the path
-    std::size_t regime = 0;   ///< of the newest motion
+    std::uint32_t node;                          // of the path
+    double log_evidence = 0;                     ///< sum of the log weights along the path
+    std::size_t regime = 0;                      ///< of the newest motion
+    [[no_unique_address]] ChoiceOf<M> choice{};  ///< of the newest observation
   };
 
   /// `count` equal particles at a pose that is taken for exact. Throws Error where there are none.
@@ -181,7 +238,8 @@ public:
     all.reserve(count);
     const CovarianceOf<Pose> none = CovarianceOf<Pose>::Zero(dof_of(start), dof_of(start));
     for (std::size_t i = 0; i < count; ++i)
-      all.push_back({start, map, paths_.extend(Tree::none, {start, {start, none}, start, start, 0}), 0, 0});
+      all.push_back(
+          {start, map, paths_.extend(Tree::none, {start, {start, none}, start, start, 0}), 0, 0, {}});
     particles_ = Particles<Particle>::equal(std::move(all));
   }
 
@@ -310,7 +368,7 @@ private:
     p.map = std::move(map);
   }
 
-  void extend(std::vector<Proposed<Pose>>& proposed, double evidence_share) {
+  void extend(std::vector<ProposedOf<M>>& proposed, double evidence_share) {
     ++step_;
     for (std::size_t i = 0; i < size(); ++i) {
       Particle& p = particles_.states[i];
@@ -321,6 +379,7 @@ private:
       paths_.release(before);
       p.log_evidence += evidence_share * proposed[i].log_weight;
       p.regime = proposed[i].regime;
+      p.choice = std::move(proposed[i].choice);
     }
   }
 
@@ -374,7 +433,7 @@ struct ConditionalFilter {
                    const typename M::Observation& z) const {
     if (!(resample_below >= 0 && resample_below <= 1) || !(evidence_share > 0 && evidence_share <= 1))
       return {.status = Status::bad_option};
-    std::vector<Proposed<typename M::Pose>> proposed(belief.size());
+    std::vector<ProposedOf<M>> proposed(belief.size());
     parallel_for(belief.size(), threads, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         Random random(seed, stream(belief.steps() + 1, i));
@@ -397,7 +456,10 @@ struct ConditionalFilter {
       parallel_for(belief.size(), threads, [&](std::size_t begin, std::size_t end) {
         for (std::size_t i = begin; i < end; ++i) {
           auto& particle = belief.particles_.states[i];
-          particle.map.insert(particle.pose, z);
+          if constexpr (ChoosingMap<M>)
+            particle.map.insert(particle.pose, z, particle.choice);
+          else
+            particle.map.insert(particle.pose, z);
         }
       });
     return result;

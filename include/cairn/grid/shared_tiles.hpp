@@ -19,7 +19,7 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
-#include <cairn/grid/detail/counted.hpp>
+#include <cairn/core/counted.hpp>
 #include <cairn/grid/tile.hpp>
 #include <cairn/version.hpp>
 
@@ -83,12 +83,12 @@ public:
 private:
   static constexpr std::int32_t block_side = 16;  // tiles
   static constexpr std::size_t none = ~std::size_t{0};
-  using Block = std::array<detail::Counted<Tile>, static_cast<std::size_t>(block_side* block_side)>;
+  using Block = std::array<Counted<Tile>, static_cast<std::size_t>(block_side* block_side)>;
 
   /// Blocks in a rectangle that grows to hold what is written.
   struct Root {
     std::int32_t column = 0, row = 0, columns = 0, rows = 0;  // in blocks
-    std::vector<detail::Counted<Block>> blocks{};
+    std::vector<Counted<Block>> blocks{};
 
     [[nodiscard]] std::size_t place(TileAddress tile) const noexcept {
       const std::int32_t c = (tile.column >> 4) - column, r = (tile.row >> 4) - row;
@@ -120,13 +120,13 @@ private:
           const TileAddress first{(old->column + column) * block_side, (old->row + row) * block_side};
           next.blocks[next.place(first)] = old->blocks[old->place(first)];
         }
-    detail::Counted<Root> root;
+    Counted<Root> root;
     root.own() = std::move(next);
     root_ = std::move(root);
   }
 
   static inline const Cell empty_{};
-  detail::Counted<Root> root_;
+  Counted<Root> root_;
 };
 
 }}  // namespace cairn::CAIRN_ABI

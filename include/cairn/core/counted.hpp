@@ -4,6 +4,7 @@
 /// @file
 /// A pointer to a value that several owners share until one of them writes.
 ///
+/// Different owners may be used from different threads at once; one owner may be read by several.
 /// std::shared_ptr's use_count() orders nothing between threads; unique() here does: who sees it true also
 /// sees all that former owners did.
 #pragma once
@@ -14,8 +15,10 @@
 
 #include <cairn/version.hpp>
 
-namespace cairn { inline namespace CAIRN_ABI { namespace detail {
+namespace cairn { inline namespace CAIRN_ABI {
 
+/// Copying is O(1); own() copies the value where others hold it. T may be incomplete where only a Counted<T>
+/// is named: trees whose branches are shared.
 template <class T>
 class Counted {
 public:
@@ -35,11 +38,16 @@ public:
   [[nodiscard]] explicit operator bool() const noexcept { return held_ != nullptr; }
   [[nodiscard]] const T* get() const noexcept { return held_ == nullptr ? nullptr : &held_->value; }
 
+  /// Others hold the value too: own() would copy it.
+  [[nodiscard]] bool shared() const noexcept {
+    return held_ != nullptr && held_->owners.load(std::memory_order_acquire) != 1;
+  }
+
   /// The value for this owner alone: made where there is none, copied where others hold it too.
   [[nodiscard]] T& own() {
     if (held_ == nullptr)
       held_ = new Node{};
-    else if (held_->owners.load(std::memory_order_acquire) != 1)
+    else if (shared())
       *this = Counted(new Node{held_->value});
     return held_->value;
   }
@@ -56,4 +64,4 @@ private:
   Node* held_ = nullptr;
 };
 
-}}}  // namespace cairn::CAIRN_ABI::detail
+}}  // namespace cairn::CAIRN_ABI

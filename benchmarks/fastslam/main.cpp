@@ -1,0 +1,272 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+// The scoreboard of FastSLAM: scripts/scoreboard fastslam. Five seeds of published logs with one setting, a
+// published map with simulated drives, and what it costs to keep many landmarks in many particles. EKF-SLAM
+// on the library's joint Gaussian runs on the same logs.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <iostream>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include <cairn/core/random.hpp>
+#include <cairn/core/statistics.hpp>
+
+#include "batch.hpp"
+#include "ekf_slam.hpp"
+#include "slam.hpp"
+#include "support/data.hpp"
+#include "support/scoreboard.hpp"
+
+namespace {
+
+using namespace cairn_bench;
+using namespace fastslam;
+using cairn::SE2;
+using cairn::Vector;
+
+constexpr std::uint64_t seeds = 5;
+
+double median(std::vector<double> values) {
+  std::ranges::sort(values);
+  return values[values.size() / 2];
+}
+std::string worst(const std::vector<double>& values) {
+  return "worst of 5 seeds " + std::to_string(*std::ranges::max_element(values));
+}
+
+SlamOptions options_of(std::size_t particles, std::uint64_t seed) {
+  return {.particles = particles, .seed = seed, .threads = std::max(1U, std::thread::hardware_concurrency())};
+}
+
+struct Runs {
+  std::vector<double> path, landmarks;
+};
+Runs runs_of(const LandmarkLog& log, std::size_t particles) {
+  Runs runs;
+  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+    const Results r = run(log, options_of(particles, seed));
+    runs.path.push_back(*r.path_error);
+    runs.landmarks.push_back(r.landmark_error.value_or(0));
+    std::cerr << log.name << ", seed " << seed << ": path " << runs.path.back() << " m, landmarks "
+              << runs.landmarks.back() << " m\n";
+  }
+  return runs;
+}
+
+/// Poses at the frames of a path that has more.
+std::vector<Vector<2>> at_frames(const LandmarkLog& log, const std::vector<cairn::StampedPose2>& path) {
+  std::vector<Vector<2>> places;
+  for (const auto& p : path)
+    if (places.size() < log.frames.size() && p.time == log.frames[places.size()].time)
+      places.push_back(p.pose.translation());
+  return places;
+}
+
+double fitted(const std::vector<Vector<2>>& path, const std::vector<Vector<2>>& is) {
+  return rms(path, is, rigid_fit(path, is));
+}
+
+/// EKF-SLAM's path, measured as FastSLAM's.
+double ekf_path_error(const LandmarkLog& log) {
+  std::vector<SE2> poses;
+  for (const auto& pose : ekf_slam(log).poses) poses.push_back(pose.mean);
+  std::vector<Vector<2>> path, is;
+  for (const auto& p : filled(log, poses)) {
+    const auto after = std::upper_bound(log.truth.begin(), log.truth.end(), p.time,
+                                        [](double t, const auto& truth) { return t < truth.time; });
+    if (after == log.truth.begin()) continue;
+    path.push_back(p.pose.translation());
+    is.push_back(std::prev(after)->pose.translation());
+  }
+  return fitted(path, is);
+}
+
+void add_robots(Scoreboard& board) {
+  const auto folder = cairn_test::real_data("mrclam_7");
+  for (const int robot : {1, 2, 3}) {
+    const std::string title = "UTIAS 7, robot " + std::to_string(robot) + ": ";
+    Row path{.name = title + "path, identities known, M = 20", .unit = "m", .must = 0.25, .aim = 0.15};
+    Row landmarks{.name = title + "landmarks", .unit = "m", .must = 0.15, .aim = 0.08};
+    Row ratio{.name = title + "path, withheld, M = 100, over known", .unit = "x", .must = 1.5, .aim = 1.1};
+    if (folder) {
+      LandmarkLog log = read_mrclam(*folder, robot);
+      const Runs known = runs_of(log, 20);
+      path.rival = ekf_path_error(log);
+      path.rival_name = "EKF-SLAM, its online path";
+      log.withhold_identities();
+      const Runs withheld = runs_of(log, 100);
+      path.measured = median(known.path);
+      path.note = worst(known.path);
+      landmarks.measured = median(known.landmarks);
+      landmarks.note = worst(known.landmarks);
+      ratio.measured = median(withheld.path) / median(known.path);
+      ratio.note = worst(withheld.path) + " m";
+    } else {
+      path.note = landmarks.note = ratio.note = "no data";
+    }
+    board.add(path);
+    board.add(landmarks);
+    board.add(ratio);
+  }
+}
+
+void add_park(Scoreboard& board) {
+  const auto folder = cairn_test::real_data("victoria_park");
+  Row error{.name = "Victoria Park: rms to the batch optimum, M = 50", .unit = "m", .must = 3, .aim = 1};
+  Row few{.name = "the same, M = 10", .unit = "m"};
+  Row time{.name = "the same, M = 50: CPU", .unit = "s", .must = 10, .aim = 1};
+  if (folder) {
+    const LandmarkLog log = read_graph(*folder / "victoria_park_graph.txt");
+    std::vector<Vector<2>> is;
+    for (const SE2& pose : growing_batch_optimum(log).poses) is.push_back(pose.translation());
+    const auto errors = [&](std::size_t particles, std::vector<double>& seconds) {
+      std::vector<double> all;
+      for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+        const Results r = run(log, options_of(particles, seed));
+        all.push_back(fitted(at_frames(log, r.mean), is));
+        seconds.push_back(r.cpu_seconds);
+      }
+      return all;
+    };
+    std::vector<double> seconds, ignored;
+    const std::vector<double> fifty = errors(50, seconds), ten = errors(10, ignored);
+    error.measured = median(fifty);
+    error.note = "after a rigid fit; " + worst(fifty);
+    few.measured = median(ten);
+    few.note = worst(ten);
+    time.measured = median(seconds);
+    const EkfSlamRun ekf = ekf_slam(log);
+    std::vector<Vector<2>> path;
+    for (const auto& pose : ekf.poses) path.push_back(pose.mean.translation());
+    error.rival = fitted(path, is);
+    time.rival = ekf.cpu_seconds;
+    error.rival_name = time.rival_name = "EKF-SLAM, its online path";
+  } else {
+    error.note = few.note = time.note = "no data";
+  }
+  board.add(error);
+  board.add(few);
+  board.add(time);
+}
+
+void add_nees(Scoreboard& board) {
+  constexpr std::uint64_t runs = 20;
+  constexpr std::size_t frames = 300;
+  const auto folder = cairn_test::real_data("fastslam_maps");
+  Row first{.name = "webmap, 20 runs: NEES of the pose, mean over the first 100 steps", .unit = "of 3"};
+  Row share{.name = "the same: share of the first 100 steps inside the 99 % band",
+            .unit = "",
+            .must = 0.95,
+            .better = larger};
+  Row later{.name = "the same, first 300 steps", .unit = "", .aim = 0.95, .better = larger};
+  if (folder) {
+    const PointMap map = read_point_map(*folder / "example_webmap.mat");
+    std::vector<double> nees(frames, 0);
+    for (std::uint64_t seed = 1; seed <= runs; ++seed) {
+      const Results r = run(simulated(map, seed, frames), options_of(100, seed));
+      for (std::size_t k = 0; k < frames; ++k) nees[k] += *r.steps[k].nees / runs;
+    }
+    const auto band = cairn::chi_square_mean_band(3, runs, 0.99);
+    const auto inside = [&](std::size_t steps) {
+      const auto end = nees.begin() + static_cast<std::ptrdiff_t>(steps);
+      return static_cast<double>(
+                 std::count_if(nees.begin(), end, [&](double v) { return band.contains(v); })) /
+             static_cast<double>(steps);
+    };
+    cairn::RunningMoments mean;
+    for (std::size_t k = 0; k < 100; ++k) mean.add(nees[k]);
+    first.measured = mean.mean();
+    first.note = "band of a step " + std::to_string(band.low) + " to " + std::to_string(band.high);
+    share.measured = inside(100);
+    later.measured = inside(frames);
+  } else {
+    first.note = share.note = later.note = "no data";
+  }
+  board.add(first);
+  board.add(share);
+  board.add(later);
+}
+
+/// Milliseconds to make a hundred copies of a map their own by an update of one landmark in each.
+struct UpdateCost {
+  double milliseconds = 0, plain_milliseconds = 0;
+  std::size_t most_copies = 0;
+};
+UpdateCost update_cost(std::uint32_t landmarks) {
+  using Clock = std::chrono::steady_clock;
+  constexpr std::size_t particles = 100;
+  constexpr int rounds = 20;
+  cairn::Random random(1);
+  Map map{PointSensor{}};
+  std::vector<Vector<2>> places;
+  for (std::uint32_t i = 0; i < landmarks; ++i) {
+    places.emplace_back(random.uniform(-500, 500), random.uniform(-500, 500));
+    map.insert({}, {{map.sensor().predict({}, places.back()), i}}, {cairn::new_landmark});
+  }
+  std::vector<double> times, plain_times;
+  UpdateCost cost;
+  std::vector<cairn::MappedLandmark<Vector<2>>> plain;
+  map.for_each([&](std::uint32_t, const auto& landmark) { plain.push_back(landmark); });
+  for (int round = 0; round < rounds; ++round) {
+    const auto number = static_cast<std::uint32_t>(random.below(landmarks));
+    const SE2 x(places[number](0) - 3, places[number](1), 0);
+    const Map::Observation z{{map.sensor().predict(x, places[number]), number}};
+    auto begin = Clock::now();
+    std::vector<Map> copies(particles, map);
+    for (Map& copy : copies) copy.insert(x, z, {number});
+    times.push_back(1e3 * std::chrono::duration<double>(Clock::now() - begin).count());
+    for (const Map& copy : copies)
+      cost.most_copies = std::max(cost.most_copies, copy.node_copies() - map.node_copies());
+    if (round % 5 != 0) continue;
+    begin = Clock::now();
+    for (std::size_t i = 0; i < particles; ++i) {
+      auto copy = plain;
+      ++copy[number].sightings;
+      plain.swap(copy);
+    }
+    plain_times.push_back(1e3 * std::chrono::duration<double>(Clock::now() - begin).count());
+  }
+  cost.milliseconds = median(times);
+  cost.plain_milliseconds = median(plain_times);
+  return cost;
+}
+
+void add_index(Scoreboard& board) {
+  for (const std::uint32_t n : {100U, 1000U, 10000U, 50000U}) {
+    const UpdateCost cost = update_cost(n);
+    const bool is_owed = n == 50000;
+    const std::string title =
+        std::to_string(n) + " landmarks, 100 particles: copied and one landmark updated in each";
+    board.add({.name = title,
+               .measured = cost.milliseconds,
+               .unit = "ms",
+               .must = is_owed ? std::optional(1.0) : std::nullopt,
+               .aim = is_owed ? std::optional(0.2) : std::nullopt,
+               .rival = cost.plain_milliseconds,
+               .rival_name = "plain copies"});
+    board.add({.name = "the same: nodes copied in a particle, at most",
+               .measured = static_cast<double>(cost.most_copies),
+               .unit = "",
+               .must = is_owed ? std::optional(10.0) : std::nullopt});
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (const auto code = answer(argc, argv, "scoreboard_fastslam")) return *code;
+  Scoreboard board("fastslam");
+  add_robots(board);
+  add_park(board);
+  add_nees(board);
+  add_index(board);
+  return board.finish();
+}

@@ -1,0 +1,155 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "batch.hpp"
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <utility>
+
+#include <Eigen/SparseCholesky>
+
+#include <cairn/core/check.hpp>
+#include <cairn/core/cholesky.hpp>
+
+namespace fastslam {
+
+namespace {
+
+using cairn::Matrix;
+using cairn::SE2;
+using cairn::Vector;
+
+/// The normal equations of the whole log at one estimate: unknowns are steps of the poses, then of the
+/// landmarks.
+class NormalEquations {
+public:
+  NormalEquations(const LandmarkLog& log, const BatchOptimum& at) : log_(log), at_(at) {
+    int row = 3 * static_cast<int>(log.frames.size());
+    for (const auto& [id, place] : at.landmarks) {
+      row_of_[id] = row;
+      row += 2;
+    }
+    gradient_ = Eigen::VectorXd::Zero(row);
+    for (std::size_t k = 0; k < log.frames.size(); ++k) {
+      add_motion(k);
+      for (const auto& sighting : log.frames[k].seen)
+        if (sighting.identity) add_sighting(k, sighting);
+    }
+  }
+
+  [[nodiscard]] double cost() const { return cost_; }
+  [[nodiscard]] double slope() const { return gradient_.lpNorm<Eigen::Infinity>(); }
+
+  /// The step of the damped equations (H + damping diag H) d = -g.
+  [[nodiscard]] Eigen::VectorXd step(double damping) const {
+    Eigen::SparseMatrix<double> h(gradient_.size(), gradient_.size());
+    h.setFromTriplets(entries_.begin(), entries_.end());
+    for (int i = 0; i < gradient_.size(); ++i) h.coeffRef(i, i) *= 1 + damping;
+    const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> root(h);
+    return root.solve(-gradient_);
+  }
+  [[nodiscard]] BatchOptimum moved(const Eigen::VectorXd& d) const {
+    BatchOptimum next = at_;
+    for (std::size_t k = 0; k < next.poses.size(); ++k)
+      next.poses[k] = cairn::retract(next.poses[k], Vector<3>(d.segment<3>(3 * static_cast<int>(k))));
+    for (auto& [id, place] : next.landmarks) place += d.segment<2>(row_of_.at(id));
+    return next;
+  }
+
+private:
+  /// Adds J^T W J and J^T W e of two blocks of unknowns; only the lower triangle is kept.
+  template <int M, int A, int B>
+  void add(const Vector<M>& e, const Matrix<M>& covariance, int a, const Matrix<M, A>& by_a, int b,
+           const Matrix<M, B>& by_b) {
+    const cairn::Cholesky<M> root(covariance);
+    if (!root.good()) cairn::raise("batch_optimum: expected covariances that are positive definite");
+    const Vector<M> white = root.whiten(e);
+    const Matrix<M, A> j_a = root.whiten(by_a);
+    const Matrix<M, B> j_b = root.whiten(by_b);
+    cost_ += 0.5 * white.squaredNorm();
+    put(b, b, Matrix<B>(j_b.transpose() * j_b));
+    gradient_.segment<B>(b) += j_b.transpose() * white;
+    if (a < 0) return;
+    put(a, a, Matrix<A>(j_a.transpose() * j_a));
+    gradient_.segment<A>(a) += j_a.transpose() * white;
+    put(b, a, Matrix<B, A>(j_b.transpose() * j_a));
+  }
+  template <int R, int C>
+  void put(int row, int column, const Matrix<R, C>& m) {
+    for (int i = 0; i < R; ++i)
+      for (int j = 0; j < C; ++j)
+        if (row + i >= column + j) entries_.emplace_back(row + i, column + j, m(i, j));
+  }
+
+  void add_motion(std::size_t k) {
+    const SE2 before = k == 0 ? SE2() : at_.poses[k - 1];
+    const auto& moved = log_.frames[k].moved;
+    const Vector<3> e = cairn::local(before * moved.mean, at_.poses[k]);
+    const Matrix<3> by_before = -(at_.poses[k].inverse() * before).adjoint();
+    const int row = 3 * static_cast<int>(k);
+    add<3, 3, 3>(e, moved.covariance, row - 3, by_before, row, Matrix<3>::Identity());
+  }
+
+  void add_sighting(std::size_t k, const Map::Sighting& sighting) {
+    const SE2& x = at_.poses[k];
+    const Vector<2>& m = at_.landmarks.at(*sighting.identity);
+    const Vector<2> e = -cairn::local(log_.sensor.predict(x, m), sighting.z);
+    const Matrix<2> noise = log_.sensor.noise(x, log_.sensor.initialise(x, sighting.z));
+    add<2, 3, 2>(e, noise, 3 * static_cast<int>(k), log_.sensor.state_jacobian(x, m),
+                 row_of_.at(*sighting.identity), log_.sensor.part_jacobian(x, m));
+  }
+
+  const LandmarkLog& log_;
+  const BatchOptimum& at_;
+  std::map<std::uint32_t, int> row_of_;
+  std::vector<Eigen::Triplet<double>> entries_;
+  Eigen::VectorXd gradient_;
+  double cost_ = 0;
+};
+
+}  // namespace
+
+BatchOptimum batch_optimum(const LandmarkLog& log, const std::vector<SE2>& start) {
+  if (start.size() != log.frames.size())
+    cairn::raise("batch_optimum: expected " + std::to_string(log.frames.size()) + " poses, found " +
+                 std::to_string(start.size()));
+  BatchOptimum best{start, {}, 0, 0, false};
+  for (std::size_t k = 0; k < start.size(); ++k)
+    for (const auto& sighting : log.frames[k].seen)
+      if (sighting.identity)
+        best.landmarks.try_emplace(*sighting.identity, log.sensor.initialise(start[k], sighting.z));
+  best.cost = NormalEquations(log, best).cost();
+  double damping = 1e-4;
+  for (; best.iterations < 200 && !best.converged && damping < 1e12; ++best.iterations) {
+    const NormalEquations equations(log, best);
+    BatchOptimum next = equations.moved(equations.step(damping));
+    next.cost = NormalEquations(log, next).cost();
+    if (!(next.cost < best.cost)) {
+      damping *= 10;
+      continue;
+    }
+    next.iterations = best.iterations;
+    next.converged = best.cost - next.cost < 1e-9 * best.cost;
+    best = std::move(next);
+    damping = std::max(1e-12, damping / 10);
+  }
+  return best;
+}
+
+BatchOptimum growing_batch_optimum(const LandmarkLog& log, std::size_t by) {
+  LandmarkLog part{.name = log.name, .sensor = log.sensor};
+  BatchOptimum best;
+  while (part.frames.size() < log.frames.size()) {
+    const std::size_t end = std::min(part.frames.size() + std::max<std::size_t>(1, by), log.frames.size());
+    for (std::size_t k = part.frames.size(); k < end; ++k) {
+      part.frames.push_back(log.frames[k]);
+      const SE2& moved = log.frames[k].moved.mean;
+      best.poses.push_back(best.poses.empty() ? moved : best.poses.back() * moved);
+    }
+    best = batch_optimum(part, best.poses);
+  }
+  return best;
+}
+
+}  // namespace fastslam

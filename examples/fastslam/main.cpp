@@ -1,0 +1,134 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+// FastSLAM: particles over paths, each with its own landmarks, from published logs or a simulated drive.
+// Exit codes: 0 well; 2 a mistake; 4 interrupted, the results are of the frames before.
+#include <algorithm>
+#include <cstdint>
+#include <cstdlib>
+#include <exception>
+#include <filesystem>
+#include <iostream>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include <CLI/CLI.hpp>
+
+#include <cairn/core/check.hpp>
+
+#include "landmark_log.hpp"
+#include "outputs.hpp"
+#include "slam.hpp"
+#include "support/command_line.hpp"
+#include "support/interruption.hpp"
+#include "support/progress.hpp"
+#include "support/standard_output.hpp"
+
+namespace {
+
+using namespace fastslam;
+
+struct Options {
+  std::string data = "loop", name, folder, identities = "known", proposal = "landmarks",
+              association = "drawn";
+  int robot = 1;
+  std::size_t frames = 500;
+  std::filesystem::path out = "fastslam_out";
+  SlamOptions slam{.threads = std::max(1U, std::thread::hardware_concurrency())};
+};
+
+std::filesystem::path data_folder(const Options& options, const char* name) {
+  if (!options.folder.empty()) return options.folder;
+  const char* root = std::getenv("CAIRN_DATA");
+  if (root == nullptr)
+    cairn::raise("--data " + options.data +
+                 ": expected its folder as --folder, or that of all data in CAIRN_DATA");
+  return std::filesystem::path(root) / name;
+}
+
+LandmarkLog log_of(const Options& options) {
+  if (options.data == "mrclam") return read_mrclam(data_folder(options, "mrclam_7"), options.robot);
+  if (options.data == "victoria_park")
+    return read_graph(data_folder(options, "victoria_park") / "victoria_park_graph.txt");
+  if (options.data == "map") {
+    if (options.name.empty())
+      cairn::raise("--data map: expected the name of a map as --name: example_webmap, say");
+    const PointMap map = read_point_map(data_folder(options, "fastslam_maps") / (options.name + ".mat"));
+    return simulated(map, options.slam.seed, options.frames);
+  }
+  return simulated(loop_map(), options.slam.seed, options.frames);
+}
+
+Results run_with_progress(const LandmarkLog& log, const SlamOptions& options) {
+  const example::Interruption interruption;
+  example::Progress progress(std::clog, "frames", log.frames.size());
+  return run(log, options, [&]() -> std::optional<std::string> {
+    progress.step();
+    if (const auto signal = example::Interruption::caught())
+      return "interrupted (" + *signal + ") after " + std::to_string(progress.done()) + " frames";
+    return std::nullopt;
+  });
+}
+
+void print(const Results& r, const std::filesystem::path& out) {
+  std::cout << r.steps.size() << " frames, " << r.landmarks.size() << " landmarks\n";
+  if (r.path_error)
+    std::cout << "path " << *r.path_error << " m, odometry " << *r.odometry_error
+              << " m (rms after a rigid fit)\n";
+  if (r.landmark_error) std::cout << "landmarks " << *r.landmark_error << " m\n";
+  for (const std::string& note : r.notes) std::cout << note << "\n";
+  std::cout << "results in " << std::filesystem::absolute(out).lexically_normal().string() << "\n";
+}
+
+void add_options(CLI::App& app, Options& o) {
+  app.add_option("--data", o.data,
+                 "loop (simulated), map (simulated over a published map), mrclam, victoria_park")
+      ->check(CLI::IsMember({"loop", "map", "mrclam", "victoria_park"}));
+  app.add_option("--name", o.name,
+                 "of the map: example_webmap, example_loop1, example_loop2, example_loop902");
+  app.add_option("--folder", o.folder, "where the data is; else below CAIRN_DATA");
+  app.add_option("--robot", o.robot, "of mrclam")->check(example::whole_number(1, 5));
+  app.add_option("--frames", o.frames, "of a simulated drive, five a second")
+      ->check(example::whole_number(1, 1000000));
+  app.add_option("--identities", o.identities, "known or withheld: is it said which landmark was seen?")
+      ->check(CLI::IsMember({"known", "withheld"}));
+  app.add_option("--association", o.association, "where withheld: likeliest, or drawn by each particle")
+      ->check(CLI::IsMember({"likeliest", "drawn"}));
+  app.add_option("--proposal", o.proposal, "motion (FastSLAM 1.0) or landmarks (2.0)")
+      ->check(CLI::IsMember({"motion", "landmarks"}));
+  app.add_option("--out", o.out, "folder for the trajectory, the landmarks, the summary and the report");
+  app.add_option("--particles", o.slam.particles, "number of particles")
+      ->check(example::whole_number(1, 100000));
+  app.add_option("--seed", o.slam.seed, "the same seed gives the same results for any number of threads")
+      ->check(example::whole_number(0));
+  app.add_option("--threads", o.slam.threads, "threads")->check(example::whole_number(1, 1024));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::string name = "fastslam";
+  Options options;
+  CLI::App app{
+      "Maps landmarks from odometry and sightings: a particle filter, each particle with its own map."};
+  add_options(app, options);
+  if (const std::optional<int> code = example::parse(app, name, argc, argv)) return *code;
+  try {
+    LandmarkLog log = log_of(options);
+    if (options.identities == "withheld") log.withhold_identities();
+    options.slam.proposal = options.proposal == "motion" ? ProposalKind::motion : ProposalKind::landmarks;
+    options.slam.landmarks.pick =
+        options.association == "drawn" ? cairn::Pick::drawn : cairn::Pick::likeliest;
+    prepare_folder(options.out);
+    const Results results = run_with_progress(log, options.slam);
+    if (results.ended_early) std::cerr << name << ": " << *results.ended_early << '\n';
+    if (const auto no_report = write_outputs(results, options.out)) std::cout << *no_report << '\n';
+    print(results, options.out);
+    if (!example::flush_standard_output(name)) return example::exit_mistake;
+    return results.ended_early ? example::exit_interrupted : example::exit_well;
+  } catch (const std::exception& error) {
+    std::cerr << name << ": " << error.what() << '\n';
+    return example::exit_mistake;
+  }
+}

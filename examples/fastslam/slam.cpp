@@ -1,0 +1,216 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "slam.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <utility>
+
+#include <cairn/core/check.hpp>
+#include <cairn/filter/conditional.hpp>
+
+namespace fastslam {
+
+namespace {
+
+using cairn::SE2;
+using cairn::StampedPose2;
+using cairn::Vector;
+
+cairn::MappingStep step(const cairn::ConditionalFilter& filter, Belief& belief, const Frame& frame,
+                        ProposalKind kind) {
+  const auto motion = [&](const SE2& x, std::size_t) {
+    return cairn::Gaussian<SE2>{x * frame.moved.mean, frame.moved.covariance};
+  };
+  return kind == ProposalKind::motion ? filter.step(belief, motion, cairn::FromMotion{}, frame.seen)
+                                      : filter.step(belief, motion, cairn::FromLandmarks{}, frame.seen);
+}
+
+/// Means of the densities that a particle's poses were drawn from: without the jitter of the draws.
+std::vector<SE2> means_of(const Belief& belief, std::size_t particle) {
+  std::vector<SE2> poses;
+  for (const auto& each : belief.path(particle)) poses.push_back(each.drawn_from.mean);
+  poses.erase(poses.begin());  // the start
+  return poses;
+}
+
+/// Weighted mean of all particles' paths, pose by pose.
+std::vector<SE2> mean_path(const Belief& belief) {
+  std::vector<SE2> mean = means_of(belief, belief.best());
+  std::vector<cairn::Vector<3>> shift(mean.size(), cairn::Vector<3>::Zero());
+  const std::vector<double> weights = belief.particles().weights();
+  for (std::size_t i = 0; i < belief.size(); ++i) {
+    const std::vector<SE2> path = means_of(belief, i);
+    for (std::size_t k = 0; k < mean.size(); ++k) shift[k] += weights[i] * cairn::local(mean[k], path[k]);
+  }
+  for (std::size_t k = 0; k < mean.size(); ++k) mean[k] = cairn::retract(mean[k], shift[k]);
+  return mean;
+}
+
+std::vector<FoundLandmark> landmarks_of(const Map& map) {
+  std::vector<FoundLandmark> found;
+  map.for_each([&](std::uint32_t number, const auto& landmark) {
+    found.push_back({number, landmark.belief, landmark.sightings, landmark.log_odds});
+  });
+  return found;
+}
+
+/// Every so-manieth place of a particle's path, from the newest back.
+std::vector<Vector<2>> thinned_path(const Belief& belief, std::size_t particle) {
+  const auto path = belief.path(particle);
+  const std::size_t every = path.size() / 300 + 1;
+  std::vector<Vector<2>> places;
+  for (std::size_t back = 0; back < path.size(); back += every)
+    places.push_back(path[path.size() - 1 - back].pose.translation());
+  return places;
+}
+
+Snapshot snapshot_of(const Belief& belief, double time) {
+  constexpr std::size_t most_paths = 12;
+  Snapshot s{time, {thinned_path(belief, belief.best())}, landmarks_of(belief[belief.best()].map)};
+  for (std::size_t i = 1; i < belief.size() && s.paths.size() < most_paths; ++i)
+    if (belief[i].node != belief[i - 1].node) s.paths.push_back(thinned_path(belief, i));
+  return s;
+}
+
+/// The pose at a time, or nothing before the first; the truth is sampled far more often than it moves.
+const StampedPose2* last_until(const std::vector<StampedPose2>& path, double time) {
+  const auto after = std::upper_bound(path.begin(), path.end(), time,
+                                      [](double t, const StampedPose2& p) { return t < p.time; });
+  return after == path.begin() ? nullptr : &*std::prev(after);
+}
+
+void measure_path(Results& r, const LandmarkLog& log) {
+  if (log.truth.empty()) return;
+  std::vector<Vector<2>> is, path, odometry;
+  for (std::size_t k = 0; k < r.mean.size(); ++k)
+    if (const StampedPose2* truth = last_until(log.truth, r.mean[k].time)) {
+      is.push_back(truth->pose.translation());
+      path.push_back(r.mean[k].pose.translation());
+      odometry.push_back(r.odometry[k].pose.translation());
+      r.truth.push_back({r.mean[k].time, truth->pose});
+    }
+  if (is.empty()) return;
+  r.path_error = rms(path, is, rigid_fit(path, is));
+  r.odometry_error = rms(odometry, is, rigid_fit(odometry, is));
+}
+
+void measure_landmarks(Results& r, const LandmarkLog& log) {
+  if (!r.identities_known) return;
+  std::vector<Vector<2>> found, is;
+  for (const FoundLandmark& l : r.landmarks)
+    if (const auto truth = log.landmarks.find(l.number); truth != log.landmarks.end()) {
+      found.push_back(l.belief.mean);
+      is.push_back(truth->second);
+    }
+  if (found.size() >= 2) r.landmark_error = rms(found, is, rigid_fit(found, is));
+}
+
+bool has_identities(const LandmarkLog& log) {
+  for (const Frame& frame : log.frames)
+    for (const auto& sighting : frame.seen)
+      if (sighting.identity) return true;
+  return false;
+}
+
+}  // namespace
+
+SE2 rigid_fit(const std::vector<Vector<2>>& from, const std::vector<Vector<2>>& to) {
+  Vector<2> a = Vector<2>::Zero(), b = Vector<2>::Zero();
+  const auto count = static_cast<double>(from.size());
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    a += from[i] / count;
+    b += to[i] / count;
+  }
+  double sine = 0, cosine = 0;
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    const Vector<2> p = from[i] - a, q = to[i] - b;
+    cosine += p(0) * q(0) + p(1) * q(1);
+    sine += p(0) * q(1) - p(1) * q(0);
+  }
+  const cairn::SO2 turn(std::atan2(sine, cosine));
+  return {turn, Vector<2>(b - turn * a)};
+}
+
+double rms(const std::vector<Vector<2>>& from, const std::vector<Vector<2>>& to, const SE2& by) {
+  double sum = 0;
+  for (std::size_t i = 0; i < from.size(); ++i) sum += (by * from[i] - to[i]).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(from.size()));
+}
+
+std::vector<Vector<2>> places_of(const std::vector<StampedPose2>& path) {
+  std::vector<Vector<2>> places;
+  for (const StampedPose2& p : path) places.push_back(p.pose.translation());
+  return places;
+}
+
+std::vector<StampedPose2> filled(const LandmarkLog& log, const std::vector<SE2>& poses) {
+  std::vector<StampedPose2> all;
+  std::size_t next = 0;
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    all.push_back({log.frames[k].time, poses[k]});
+    for (; next < log.between.size() && log.between[next].frame == k; ++next) {
+      const Between& b = log.between[next];
+      SE2 pose = poses[k] * b.moved;
+      if (k + 1 < poses.size()) {
+        const double share = (b.time - log.frames[k].time) / (log.frames[k + 1].time - log.frames[k].time);
+        const Vector<3> gap = cairn::local(poses[k] * log.frames[k + 1].moved.mean, poses[k + 1]);
+        pose = cairn::retract(pose, Vector<3>(share * gap));
+      }
+      all.push_back({b.time, pose});
+    }
+  }
+  return all;
+}
+
+Results run(const LandmarkLog& log, const SlamOptions& options,
+            const std::function<std::optional<std::string>()>& on_frame) {
+  Results r{.name = log.name,
+            .seed = options.seed,
+            .particles = options.particles,
+            .threads = options.threads,
+            .proposal = options.proposal,
+            .identities_known = has_identities(log),
+            .notes = log.notes};
+  for (const auto& [id, place] : log.landmarks) r.true_landmarks.push_back(place);
+  const auto begin = std::chrono::steady_clock::now();
+  const std::clock_t cpu = std::clock();
+  Belief belief(SE2(), Map(log.sensor, options.landmarks), options.particles);
+  const cairn::ConditionalFilter filter{
+      .resample_below = options.resample_below, .seed = options.seed, .threads = options.threads};
+  std::vector<SE2> odometry;
+  const std::size_t every = std::max<std::size_t>(1, log.frames.size() / 60);
+  for (const Frame& frame : log.frames) {
+    const cairn::MappingStep did = step(filter, belief, frame, options.proposal);
+    if (!did.accepted())
+      cairn::raise("frame " + std::to_string(odometry.size()) + ": " + explain(did.status));
+    odometry.push_back(odometry.empty() ? frame.moved.mean : odometry.back() * frame.moved.mean);
+    r.steps.push_back({frame.time,
+                       did.effective_size,
+                       did.resampled,
+                       frame.seen.size(),
+                       belief[0].map.size(),
+                       belief.pose(),
+                       {}});
+    if (log.start && log.truth.size() == log.frames.size())
+      r.steps.back().nees =
+          cairn::nees(r.steps.back().pose, log.start->inverse() * log.truth[r.steps.size() - 1].pose);
+    if (odometry.size() % every == 0) r.snapshots.push_back(snapshot_of(belief, frame.time));
+    if (on_frame) r.ended_early = on_frame();
+    if (r.ended_early) break;
+  }
+  r.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  r.cpu_seconds = static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC;
+  r.odometry = filled(log, odometry);
+  r.best = filled(log, means_of(belief, belief.best()));
+  r.mean = filled(log, mean_path(belief));
+  r.landmarks = landmarks_of(belief[belief.best()].map);
+  r.node_copies = belief[belief.best()].map.node_copies();
+  measure_path(r, log);
+  measure_landmarks(r, log);
+  return r;
+}
+
+}  // namespace fastslam

@@ -1,0 +1,104 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// One run over one log, and everything that is to be said of it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <cairn/core/linalg.hpp>
+#include <cairn/eval/relations.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/manifold/se2.hpp>
+
+#include "landmark_log.hpp"
+
+namespace fastslam {
+
+enum class ProposalKind {
+  motion,    ///< FastSLAM 1.0
+  landmarks  ///< FastSLAM 2.0
+};
+
+/// One setting serves all logs.
+struct SlamOptions {
+  std::size_t particles = 20;
+  std::uint64_t seed = 1;
+  unsigned threads = 1;
+  ProposalKind proposal = ProposalKind::landmarks;
+  double resample_below = 0.5;
+  cairn::LandmarkOptions landmarks{.pick = cairn::Pick::drawn, .gate = 0.999};
+};
+
+struct StepRecord {
+  double time = 0;
+  double effective_size = 0;
+  bool resampled = false;
+  std::size_t sightings = 0, landmarks = 0;  ///< of the frame; of the first particle
+  cairn::Gaussian<cairn::SE2> pose{};
+  std::optional<double> nees{};  ///< of the pose, where the truth is known: of a start that is exact
+};
+
+/// A landmark of the best particle.
+struct FoundLandmark {
+  std::uint32_t number = 0;
+  cairn::Gaussian<cairn::Vector<2>> belief{};
+  std::uint32_t sightings = 0;
+  double log_odds = 0;
+};
+
+/// What there was to see at a moment.
+struct Snapshot {
+  double time = 0;
+  std::vector<std::vector<cairn::Vector<2>>>
+      paths{};                             ///< of a few distinct particles, thinned; the best first
+  std::vector<FoundLandmark> landmarks{};  ///< of the best
+};
+
+struct Results {
+  std::string name{};
+  std::uint64_t seed = 0;
+  std::size_t particles = 0;
+  unsigned threads = 1;
+  ProposalKind proposal = ProposalKind::landmarks;
+  bool identities_known = true;
+  std::vector<std::string> notes{};
+  std::vector<StepRecord> steps{};
+  std::vector<cairn::StampedPose2> odometry{}, best{}, mean{},
+      truth{};  ///< at frames and between, times of the log
+  std::vector<FoundLandmark> landmarks{};
+  std::vector<cairn::Vector<2>> true_landmarks{};  ///< all
+  std::vector<Snapshot> snapshots{};
+  std::size_t node_copies = 0;  ///< of the best particle's map; with several threads not always the same
+  /// Root mean square after the rigid motion that fits the path best to the truth [m]; of the landmarks, by
+  /// identity where it is known, else to the nearest true one, after the motion that fits them best.
+  std::optional<double> path_error{}, odometry_error{}, landmark_error{};
+  std::optional<std::string> ended_early{};
+  double seconds = 0, cpu_seconds = 0;
+};
+
+/// Maps the log. `on_frame` is called after every frame; what it returns, if anything, ends the run and says
+/// why. Throws cairn::Error where the log cannot be mapped.
+[[nodiscard]] Results run(const LandmarkLog& log, const SlamOptions& options,
+                          const std::function<std::optional<std::string>()>& on_frame = {});
+
+/// A pose for every frame and between them: along odometry, what that is short of the next frame's spread
+/// over the way. `poses` are of the first frames of the log.
+[[nodiscard]] std::vector<cairn::StampedPose2> filled(const LandmarkLog& log,
+                                                      const std::vector<cairn::SE2>& poses);
+
+/// The motion that brings points nearest to others, in the sense of least squares.
+[[nodiscard]] cairn::SE2 rigid_fit(const std::vector<cairn::Vector<2>>& from,
+                                   const std::vector<cairn::Vector<2>>& to);
+/// Root mean square distance of the moved points from the others.
+[[nodiscard]] double rms(const std::vector<cairn::Vector<2>>& from, const std::vector<cairn::Vector<2>>& to,
+                         const cairn::SE2& by);
+[[nodiscard]] std::vector<cairn::Vector<2>> places_of(const std::vector<cairn::StampedPose2>& path);
+
+}  // namespace fastslam

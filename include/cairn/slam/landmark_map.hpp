@@ -1,0 +1,671 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// FastSLAM: landmarks as the map of a particle, and the proposal that looks at them.
+///
+///   p(x_1:t, n_1:t, m | z, u) = p(x_1:t, n_1:t | z, u) prod_j p(m_j | x_1:t, n_1:t, z)
+/// Given the path x and which landmark n each sighting is of, landmarks are independent Gaussians
+/// (M. Montemerlo, S. Thrun, D. Koller, B. Wegbreit, "FastSLAM: a factored solution to the simultaneous
+/// localization and mapping problem", AAAI 2002; "FastSLAM 2.0", IJCAI 2003). LandmarkMap is a ConditionalMap
+/// for ConditionalFilter: with FromMotion it is FastSLAM 1.0, with FromLandmarks 2.0. Copies share what none
+/// of them has changed: a particle is copied in O(1), a landmark updated in O(log n).
+///
+/// The sensor is a ConditionalMeasurement (rao_blackwell.hpp) that can do two things more:
+///
+/// ```cpp
+/// struct RangeBearingOfPoint {
+///   using State = cairn::SE2;  using Part = cairn::Vector<2>;
+///   using Measurement = cairn::Product<cairn::Vector<1>, cairn::SO2>;  // range, bearing
+///   Measurement predict(const State& x, const Part& m) const;
+///   cairn::Matrix<2> part_jacobian(const State& x, const Part& m) const;
+///   cairn::Matrix<2, 3> state_jacobian(const State& x, const Part& m) const;
+///   cairn::Matrix<2> noise(const State& x, const Part& m) const;
+///   Part initialise(const State& x, const Measurement& z) const;  // where a landmark seen as z is
+///   double detection_probability(const State& x, const Part& m) const;  // optional: 0 out of view
+///   double reach() const;                                               // optional: of the sensor
+/// };
+/// ```
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <concepts>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <cairn/core/assignment.hpp>
+#include <cairn/core/check.hpp>
+#include <cairn/core/cholesky.hpp>
+#include <cairn/core/linalg.hpp>
+#include <cairn/core/random.hpp>
+#include <cairn/core/statistics.hpp>
+#include <cairn/filter/conditional.hpp>
+#include <cairn/filter/extended.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/rao_blackwell.hpp>
+#include <cairn/filter/status.hpp>
+#include <cairn/index/shared_array.hpp>
+#include <cairn/index/shared_kd_tree.hpp>
+#include <cairn/manifold/manifold.hpp>
+#include <cairn/version.hpp>
+
+namespace cairn { inline namespace CAIRN_ABI {
+
+/// A sensor of landmarks: one sighting determines where its landmark is, given the pose.
+template <class L>
+concept LandmarkSensor =
+    ConditionalMeasurement<L> && requires(const L& l, const typename L::State& x, const typename L::Part& m,
+                                          const typename L::Measurement& z) {
+      { l.state_jacobian(x, m) } -> detail::JacobianLike<typename L::Measurement, typename L::State>;
+      { l.initialise(x, z) } -> StateOf<typename L::Part>;
+    };
+
+/// What was seen, and of which landmark where the sensor knows (a bar code): any small number.
+template <Manifold Z>
+struct LandmarkSighting {
+  Z z;
+  std::optional<std::uint32_t> identity{};
+};
+
+/// Which landmark a sighting is of, in a map: its number there, or one of these.
+inline constexpr std::uint32_t new_landmark = 0xffffffffU;  ///< seen for the first time
+inline constexpr std::uint32_t no_landmark = 0xfffffffeU;   ///< of nothing: clutter
+
+/// One number for each sighting of an observation.
+using Association = std::vector<std::uint32_t>;
+
+/// How sightings without an identity find their landmarks; no two of an observation get the same.
+enum class Pick {
+  likeliest,  ///< of all assignments the one of the greatest likelihood
+  drawn       ///< each particle draws its own, in proportion to the likelihood, one sighting after the other
+};
+
+struct LandmarkOptions {
+  Pick pick = Pick::likeliest;
+  double gate = 0.99;  ///< share of a landmark's sightings that are inside its gate
+  /// The same for sightings with an identity; 1: what is said to be a landmark is taken for it, wherever.
+  double gate_of_named = 1;
+  /// Densities of a sighting that is of no landmark of the map, over the space of measurements: of one that
+  /// is new, and of clutter. Sightings with an identity are never taken for new where it is known.
+  double new_density = 1e-3;
+  double clutter_density = 1e-4;
+  double seen = 0.85;            ///< added to a landmark's log odds by a sighting, at least
+  double false_share = 0.05;     ///< probability that what is no landmark is seen again
+  double remove_below = -1;      ///< log odds; -infinity keeps all
+  double most_log_odds = 8;      ///< what has been seen a thousand times can still go
+  double filing_distance = 0.5;  ///< a landmark that moved by less stays where it is filed in the index
+
+  [[nodiscard]] bool valid() const noexcept {
+    const auto is_share = [](double v) { return v > 0 && v < 1; };
+    return is_share(gate) && gate_of_named > 0 && gate_of_named <= 1 && is_share(false_share) &&
+           new_density > 0 && clutter_density > 0 && seen >= 0 && remove_below < 0 && most_log_odds > 0 &&
+           filing_distance > 0 && std::isfinite(new_density) && std::isfinite(clutter_density) &&
+           std::isfinite(seen) && std::isfinite(filing_distance);
+  }
+};
+
+/// A landmark of one particle.
+template <Manifold M>
+struct MappedLandmark {
+  Gaussian<M> belief{};
+  double log_odds = 0;          ///< of its being there at all
+  std::uint32_t sightings = 0;  ///< 0: there is none of this number
+};
+
+namespace detail {
+
+/// The sensor as an ordinary one of the pose, over a landmark that is as uncertain as believed:
+/// noise H_m S H_m^T + R.
+template <LandmarkSensor L>
+struct SensorOfPose {
+  using State = typename L::State;
+  using Measurement = typename L::Measurement;
+  const L& sensor;
+  const Gaussian<typename L::Part>& landmark;
+  [[nodiscard]] decltype(auto) predict(const State& x) const { return sensor.predict(x, landmark.mean); }
+  [[nodiscard]] decltype(auto) jacobian(const State& x) const {
+    return sensor.state_jacobian(x, landmark.mean);
+  }
+  [[nodiscard]] CovarianceOf<Measurement> noise(const State& x) const {
+    const auto h = dense_of(sensor.part_jacobian(x, landmark.mean));
+    const CovarianceOf<Measurement> r = dense_of(sensor.noise(x, landmark.mean));
+    return symmetrised(CovarianceOf<Measurement>(h * landmark.covariance * h.transpose() + r));
+  }
+};
+
+/// How many numbers a landmark has a place by: of vectors as many as they have, of others none.
+template <class M>
+inline constexpr int place_size = 0;
+template <class S, int N, int Options, int MaxRows, int MaxColumns>
+inline constexpr int place_size<Eigen::Matrix<S, N, 1, Options, MaxRows, MaxColumns>> =
+    N > 0 && N <= 3 ? N : 0;
+
+/// Where landmarks are, so that a sighting's candidates are found without looking at all. Each is filed at a
+/// point, which may lag behind its mean; the widest standard deviation of all is an upper bound.
+template <int D>
+struct LandmarkPlaces {
+  SharedKdTree<D> tree{};
+  SharedArray<std::array<double, D>> filed{};
+  double widest = 0;
+};
+template <>
+struct LandmarkPlaces<0> {};
+
+}  // namespace detail
+
+/// The landmarks of one particle: ConditionalMap and ChoosingMap. Given which landmark a sighting is of, and
+/// the pose, a landmark is updated by the extended Kalman filter. Landmarks of types other than vectors of up
+/// to three numbers have no index: candidates are then all of them.
+template <LandmarkSensor L>
+class LandmarkMap {
+public:
+  using Sensor = L;
+  using Pose = typename L::State;
+  using Landmark = typename L::Part;
+  using Measurement = typename L::Measurement;
+  using Sighting = LandmarkSighting<Measurement>;
+  using Observation = std::vector<Sighting>;
+  using Choice = Association;
+
+  /// Identities must be below this: they are places in an array.
+  static constexpr std::uint32_t most_identity = 1U << 24U;
+
+  /// An empty map. Throws Error where an option is out of its range.
+  explicit LandmarkMap(L sensor = {}, const LandmarkOptions& options = {})
+      : common_(std::make_shared<const Common>(Common{std::move(sensor), checked(options),
+                                                      squared_gate(options.gate),
+                                                      squared_gate(options.gate_of_named)})) {}
+
+  [[nodiscard]] const L& sensor() const noexcept { return common_->sensor; }
+  [[nodiscard]] const LandmarkOptions& options() const noexcept { return common_->options; }
+  /// Of landmarks that are there.
+  [[nodiscard]] std::size_t size() const noexcept { return size_; }
+  /// The landmark, or null where there is none of this number.
+  [[nodiscard]] const MappedLandmark<Landmark>* find(std::uint32_t number) const noexcept {
+    const MappedLandmark<Landmark>& found = landmarks_[number];
+    return found.sightings == 0 ? nullptr : &found;
+  }
+  /// Calls visit(number, landmark) for all, by growing numbers.
+  template <class Visit>
+  void for_each(Visit&& visit) const {
+    for (std::uint32_t n = 0; n < landmarks_.size(); ++n)
+      if (const auto* landmark = find(n)) visit(n, *landmark);
+  }
+  /// Nodes that changes of this map have copied because other maps held them. Of several maps that write to
+  /// the same nodes on different threads it is not said which copies.
+  [[nodiscard]] std::size_t node_copies() const noexcept {
+    if constexpr (is_placed)
+      return landmarks_.node_copies() + places_.tree.node_copies() + places_.filed.node_copies();
+    else
+      return landmarks_.node_copies();
+  }
+
+  /// Which landmarks these sightings are of, for a pose that may be uncertain: its mean, and covariances that
+  /// it adds to what is predicted; a zero covariance is a pose that is known. The likelihood is the product
+  /// of the sightings' own, each with the pose's uncertainty. Throws Error where a sighting is not finite or
+  /// an identity too large.
+  [[nodiscard]] Chosen<Choice> associate(const Gaussian<Pose>& x, const Observation& z, Random& random) const;
+
+  /// The same at a known pose, with its likelihood: for FromMotion.
+  [[nodiscard]] Chosen<Choice> choose(const Pose& x, const Observation& z, Random& random) const {
+    return associate(known(x), z, random);
+  }
+  /// log p(z, n | x, m)
+  [[nodiscard]] double log_likelihood(const Pose& x, const Observation& z, const Choice& n) const;
+  /// log p(z, n | x, m) of the likeliest n.
+  [[nodiscard]] double log_likelihood(const Pose& x, const Observation& z) const {
+    return likeliest(candidates_of(known(x), z)).log_likelihood;
+  }
+  /// log of the density of a sighting that is not of a landmark of the map.
+  [[nodiscard]] double log_density_of(std::uint32_t not_a_landmark) const {
+    return std::log(not_a_landmark == new_landmark ? options().new_density : options().clutter_density);
+  }
+
+  /// Takes the sightings in: updates, new landmarks, and the odds of what was not seen though in view.
+  void insert(const Pose& x, const Observation& z, const Choice& n);
+  /// The same with the likeliest association at this pose.
+  void insert(const Pose& x, const Observation& z) {
+    insert(x, z, likeliest(candidates_of(known(x), z)).choice);
+  }
+
+private:
+  struct Common {
+    L sensor;
+    LandmarkOptions options;
+    double gate, gate_of_named;  // of squared Mahalanobis distances
+  };
+  struct Candidate {
+    std::uint32_t landmark = no_landmark;
+    double log_density = 0;
+  };
+  /// What a sighting may be of: one of these or, where it has no name or that one is taken, something else.
+  struct Alternatives {
+    std::vector<Candidate> known{};
+    Candidate otherwise{};
+    bool is_named = false;
+  };
+  using Candidates = std::vector<Alternatives>;
+
+  static constexpr int places = detail::place_size<Landmark>;
+  static constexpr bool is_placed = places > 0;
+
+  static const LandmarkOptions& checked(const LandmarkOptions& options) {
+    if (!options.valid()) raise("LandmarkMap: expected options within their ranges");
+    return options;
+  }
+  static double squared_gate(double share) {
+    return share < 1 ? chi_square_quantile(share, dof<Measurement>) : std::numeric_limits<double>::infinity();
+  }
+  static Gaussian<Pose> known(const Pose& x) { return {x, CovarianceOf<Pose>::Zero(dof_of(x), dof_of(x))}; }
+
+  [[nodiscard]] Candidates candidates_of(const Gaussian<Pose>& x, const Observation& z) const;
+  void check(const Observation& z) const;
+  [[nodiscard]] std::optional<Candidate> candidate(const Gaussian<Pose>& x, const Measurement& z,
+                                                   std::uint32_t number, double gate) const;
+  template <class Visit>
+  void for_each_near(const Gaussian<Pose>& x, const Measurement& z, Visit&& visit) const;
+  [[nodiscard]] Chosen<Choice> likeliest(const Candidates& candidates) const;
+  [[nodiscard]] static Chosen<Choice> drawn(const Candidates& candidates, Random& random);
+
+  [[nodiscard]] std::optional<Gaussian<Landmark>> seen_first(const Pose& x, const Measurement& z) const;
+  void update(const Pose& x, const Measurement& z, std::uint32_t number);
+  void add(const Pose& x, const Sighting& sighting);
+  void remove(std::uint32_t number);
+  void miss(const Pose& x, const Choice& seen);
+  [[nodiscard]] std::vector<std::uint32_t> in_view(const Pose& x) const;
+  [[nodiscard]] double gained_odds(const Pose& x, const Landmark& m) const;
+  [[nodiscard]] double certain_detection(const Pose& x, const Gaussian<Landmark>& landmark) const;
+  void file(std::uint32_t number, bool is_new);
+
+  std::shared_ptr<const Common> common_;
+  SharedArray<MappedLandmark<Landmark>> landmarks_;
+  [[no_unique_address]] detail::LandmarkPlaces<places> places_{};
+  std::size_t size_ = 0;
+};
+
+/// FastSLAM 2.0: the pose is drawn from what motion and sightings say of it together.
+///
+/// Starting at the motion, q takes in the sightings of known landmarks one after the other, the surest first,
+/// by the extended Kalman filter; x is drawn from q, and
+///   weight = p(x | motion) p(z, n | x, m) / q(x) / q(n)
+/// is exact for whatever q is. The product of the innovations' densities on the way is the same number in the
+/// linear case, and where it is not, has less variance and a bias (`evidence`). Densities are of the steps
+/// from their means, whose volume differs from the group's by a share of angle^2 / 12.
+struct FromLandmarks {
+  enum class Weight { exact, evidence };
+  Weight weight = Weight::exact;
+  int iterations = 1;  ///< of each sighting's update: more where the sensor bends over the pose's spread
+
+  /// Throws Error where the motion's covariance is singular: then use FromMotion, or say how the wheels slip.
+  template <LandmarkSensor L>
+  [[nodiscard]] ProposedOf<LandmarkMap<L>> operator()(const LandmarkMap<L>& map,
+                                                      const Gaussian<typename L::State>& motion,
+                                                      const typename LandmarkMap<L>::Observation& z,
+                                                      Random& random) const {
+    const double log_volume = Cholesky<dof<typename L::State>>(motion.covariance).log_determinant();
+    if (!std::isfinite(log_volume))
+      raise(
+          "FromLandmarks: expected a motion that is uncertain in every direction, found a singular "
+          "covariance");
+    Chosen<Association> chosen = map.associate(motion, z, random);
+    Gaussian<typename L::State> q = motion;
+    const double log_evidence = take_in(q, map, z, chosen.choice);
+    typename L::State x = sample(q, random);
+    const double log_likelihood = map.log_likelihood(x, z, chosen.choice);
+    const double log_weight = weight == Weight::evidence
+                                  ? log_evidence
+                                  : log_likelihood + log_density(motion, x) - log_density(q, x);
+    return {std::move(x),
+            std::move(q),
+            log_weight - chosen.log_probability,
+            log_likelihood,
+            0,
+            std::move(chosen.choice)};
+  }
+
+private:
+  /// Returns the sum of the innovations' log densities.
+  template <LandmarkSensor L>
+  double take_in(Gaussian<typename L::State>& q, const LandmarkMap<L>& map,
+                 const typename LandmarkMap<L>::Observation& z, const Association& n) const {
+    struct Known {
+      std::size_t sighting;
+      double log_volume;
+    };
+    double log_evidence = 0;
+    std::vector<Known> known;
+    for (std::size_t k = 0; k < z.size(); ++k) {
+      const auto* landmark = map.find(n[k]);
+      if (landmark == nullptr) {
+        log_evidence += map.log_density_of(n[k]);
+        continue;
+      }
+      const detail::SensorOfPose<L> sensor{map.sensor(), landmark->belief};
+      known.push_back({k, Cholesky<dof<typename L::Measurement>>(sensor.noise(q.mean)).log_determinant()});
+    }
+    std::sort(known.begin(), known.end(), [](const Known& a, const Known& b) {
+      return a.log_volume < b.log_volume || (a.log_volume == b.log_volume && a.sighting < b.sighting);
+    });
+    const Extended filter{.iterations = iterations};
+    for (const Known& each : known) {
+      const auto& landmark = map.find(n[each.sighting])->belief;
+      const auto in = filter.update(q, detail::SensorOfPose<L>{map.sensor(), landmark}, z[each.sighting].z);
+      if (in.accepted()) log_evidence += in.log_likelihood();
+    }
+    return log_evidence;
+  }
+};
+
+template <LandmarkSensor L>
+void LandmarkMap<L>::check(const Observation& z) const {
+  for (std::size_t k = 0; k < z.size(); ++k) {
+    if (!detail::finite_state(z[k].z))
+      raise("LandmarkMap: expected sightings of finite numbers, found another: " + std::to_string(k));
+    if (z[k].identity && *z[k].identity >= most_identity)
+      raise("LandmarkMap: expected identities below " + std::to_string(most_identity) + ", found " +
+            std::to_string(*z[k].identity));
+  }
+}
+
+/// The sighting as one of this landmark; nothing where it lies outside the gate.
+template <LandmarkSensor L>
+auto LandmarkMap<L>::candidate(const Gaussian<Pose>& x, const Measurement& z, std::uint32_t number,
+                               double gate) const -> std::optional<Candidate> {
+  const detail::SensorOfPose<L> sensor{common_->sensor, find(number)->belief};
+  const auto h = detail::dense_of(sensor.jacobian(x.mean));
+  Innovation<dof<Measurement>, ScalarOf<Measurement>> in;
+  in.residual = local(Measurement(sensor.predict(x.mean)), z);
+  in.covariance =
+      symmetrised(CovarianceOf<Measurement>(h * x.covariance * h.transpose() + sensor.noise(x.mean)));
+  const Cholesky<dof<Measurement>> root(in.covariance);
+  if (!root.good()) return std::nullopt;
+  in.nis = root.whiten(in.residual).squaredNorm();
+  if (!(in.nis <= gate)) return std::nullopt;
+  return Candidate{number, in.log_likelihood()};
+}
+
+template <LandmarkSensor L>
+auto LandmarkMap<L>::candidates_of(const Gaussian<Pose>& x, const Observation& z) const -> Candidates {
+  check(z);
+  Candidates all(z.size());
+  for (std::size_t k = 0; k < z.size(); ++k) {
+    Alternatives& of = all[k];
+    of.is_named = z[k].identity.has_value();
+    const double gate = of.is_named ? common_->gate_of_named : common_->gate;
+    const auto add = [&](std::uint32_t number) {
+      if (const auto found = candidate(x, z[k].z, number, gate)) of.known.push_back(*found);
+    };
+    const bool is_of_the_map = of.is_named && find(*z[k].identity) != nullptr;
+    if (is_of_the_map)
+      add(*z[k].identity);
+    else if (!of.is_named)
+      for_each_near(x, z[k].z, add);
+    const bool is_new = !is_of_the_map && (of.is_named || options().new_density >= options().clutter_density);
+    of.otherwise.landmark = is_new ? new_landmark : no_landmark;
+    of.otherwise.log_density = log_density_of(of.otherwise.landmark);
+    // Candidates come in the order of the index, which depends on its history.
+    std::sort(of.known.begin(), of.known.end(),
+              [](const Candidate& a, const Candidate& b) { return a.landmark < b.landmark; });
+  }
+  return all;
+}
+
+/// Landmarks that a sighting from here may be of. Of a landmark inside the gate each number of its place
+/// differs from the sighting's by no more than the gate's root times the sum of both standard deviations.
+template <LandmarkSensor L>
+template <class Visit>
+void LandmarkMap<L>::for_each_near(const Gaussian<Pose>& x, const Measurement& z, Visit&& visit) const {
+  if constexpr (!is_placed) {
+    for_each([&](std::uint32_t number, const auto&) { visit(number); });
+  } else {
+    const Landmark place = common_->sensor.initialise(x.mean, z);
+    const auto h_m = detail::dense_of(common_->sensor.part_jacobian(x.mean, place));
+    const auto h_x = detail::dense_of(common_->sensor.state_jacobian(x.mean, place));
+    const CovarianceOf<Measurement> r =
+        h_x * x.covariance * h_x.transpose() + detail::dense_of(common_->sensor.noise(x.mean, place));
+    const Cholesky<dof<Measurement>> root(symmetrised(r));
+    if (!root.good() || !all_finite(place)) return;
+    const auto white = root.whiten(h_m);
+    const Cholesky<places> information(symmetrised(CovarianceOf<Landmark>(white.transpose() * white)));
+    if (!information.good()) return;
+    const CovarianceOf<Landmark> spread = information.inverse();
+    typename SharedKdTree<places>::Point low, high;
+    for (int a = 0; a < places; ++a) {
+      const double half =
+          std::sqrt(common_->gate) * (std::sqrt(spread(a, a)) + places_.widest) + options().filing_distance;
+      low[static_cast<std::size_t>(a)] = place(a) - half;
+      high[static_cast<std::size_t>(a)] = place(a) + half;
+    }
+    places_.tree.for_each_in_box(low, high, [&](std::uint32_t number, const auto&) { visit(number); });
+  }
+}
+
+template <LandmarkSensor L>
+Chosen<Association> LandmarkMap<L>::likeliest(const Candidates& candidates) const {
+  std::vector<std::uint32_t> columns;
+  for (const Alternatives& of : candidates)
+    for (const Candidate& c : of.known) columns.push_back(c.landmark);
+  std::sort(columns.begin(), columns.end());
+  columns.erase(std::unique(columns.begin(), columns.end()), columns.end());
+  const std::size_t rows = candidates.size(), width = columns.size() + rows;
+  std::vector<double> costs(rows * width, std::numeric_limits<double>::infinity());
+  for (std::size_t k = 0; k < rows; ++k) {
+    for (const Candidate& c : candidates[k].known) {
+      const auto at = std::lower_bound(columns.begin(), columns.end(), c.landmark);
+      costs[k * width + static_cast<std::size_t>(at - columns.begin())] = -c.log_density;
+    }
+    constexpr double only_if_taken = 1e9;
+    const bool has_name = candidates[k].is_named && !candidates[k].known.empty();
+    costs[k * width + columns.size() + k] = has_name ? only_if_taken : -candidates[k].otherwise.log_density;
+  }
+  const auto assigned = best_assignment(costs, rows);
+  Chosen<Association> result;
+  for (std::size_t k = 0; k < rows; ++k) {
+    const std::size_t column = (*assigned)[k];
+    const bool is_known = column < columns.size();
+    result.choice.push_back(is_known ? columns[column] : candidates[k].otherwise.landmark);
+    result.log_likelihood += is_known ? -costs[k * width + column] : candidates[k].otherwise.log_density;
+  }
+  return result;
+}
+
+template <LandmarkSensor L>
+Chosen<Association> LandmarkMap<L>::drawn(const Candidates& candidates, Random& random) {
+  Chosen<Association> result;
+  const auto taken = [&](std::uint32_t landmark) {
+    return std::find(result.choice.begin(), result.choice.end(), landmark) != result.choice.end();
+  };
+  for (const Alternatives& of : candidates) {
+    std::vector<Candidate> free;
+    for (const Candidate& c : of.known)
+      if (!taken(c.landmark)) free.push_back(c);
+    if (!of.is_named || free.empty()) free.push_back(of.otherwise);
+    std::vector<double> log_densities;
+    for (const Candidate& c : free) log_densities.push_back(c.log_density);
+    const double total = log_sum_exp(log_densities);
+    double left = random.uniform();
+    std::size_t i = 0;
+    while (i + 1 < free.size() && left >= std::exp(free[i].log_density - total))
+      left -= std::exp(free[i++].log_density - total);
+    result.choice.push_back(free[i].landmark);
+    result.log_likelihood += free[i].log_density;
+    result.log_probability += free[i].log_density - total;
+  }
+  return result;
+}
+
+template <LandmarkSensor L>
+Chosen<Association> LandmarkMap<L>::associate(const Gaussian<Pose>& x, const Observation& z,
+                                              Random& random) const {
+  const Candidates candidates = candidates_of(x, z);
+  return options().pick == Pick::drawn ? drawn(candidates, random) : likeliest(candidates);
+}
+
+template <LandmarkSensor L>
+double LandmarkMap<L>::log_likelihood(const Pose& x, const Observation& z, const Choice& n) const {
+  CAIRN_EXPECTS(n.size() == z.size(), "log_likelihood needs one landmark for each sighting");
+  double sum = 0;
+  for (std::size_t k = 0; k < z.size(); ++k) {
+    const auto* landmark = find(n[k]);
+    if (landmark == nullptr) {
+      sum += log_density_of(n[k]);
+      continue;
+    }
+    const detail::SensorOfPose<L> sensor{common_->sensor, landmark->belief};
+    const Gaussian<Measurement> expected{Measurement(sensor.predict(x)), sensor.noise(x)};
+    sum += log_density(expected, z[k].z);
+  }
+  return sum;
+}
+
+template <LandmarkSensor L>
+void LandmarkMap<L>::insert(const Pose& x, const Observation& z, const Choice& n) {
+  CAIRN_EXPECTS(n.size() == z.size(), "insert needs one landmark for each sighting");
+  bool unnamed = false;
+  for (std::size_t k = 0; k < z.size(); ++k) {
+    unnamed = unnamed || !z[k].identity;
+    if (n[k] == new_landmark)
+      add(x, z[k]);
+    else if (find(n[k]) != nullptr)
+      update(x, z[k].z, n[k]);
+  }
+  if (unnamed) miss(x, n);
+}
+
+template <LandmarkSensor L>
+void LandmarkMap<L>::update(const Pose& x, const Measurement& z, std::uint32_t number) {
+  MappedLandmark<Landmark>& landmark = landmarks_.write(number);
+  const auto in = Extended{}.update(landmark.belief, detail::HeldSensor<L>{common_->sensor, x}, z);
+  if (!in.accepted()) return;
+  ++landmark.sightings;
+  landmark.log_odds =
+      std::min(landmark.log_odds + gained_odds(x, landmark.belief.mean), options().most_log_odds);
+  file(number, false);
+}
+
+/// The landmark that this sighting alone says: covariance (H_m^T R^-1 H_m)^-1. Nothing where it does not
+/// determine one.
+template <LandmarkSensor L>
+std::optional<Gaussian<typename LandmarkMap<L>::Landmark>> LandmarkMap<L>::seen_first(
+    const Pose& x, const Measurement& z) const {
+  Gaussian<Landmark> landmark{common_->sensor.initialise(x, z), {}};
+  const auto h = detail::dense_of(common_->sensor.part_jacobian(x, landmark.mean));
+  const CovarianceOf<Measurement> r = detail::dense_of(common_->sensor.noise(x, landmark.mean));
+  const Cholesky<dof<Measurement>> root(r);
+  if (!root.good() || !all_finite(h) || !detail::finite_state(landmark.mean)) return std::nullopt;
+  const auto white = root.whiten(h);
+  const Cholesky<dof<Landmark>> information(symmetrised(CovarianceOf<Landmark>(white.transpose() * white)));
+  if (!information.good()) return std::nullopt;
+  landmark.covariance = information.inverse();
+  return landmark;
+}
+
+template <LandmarkSensor L>
+void LandmarkMap<L>::add(const Pose& x, const Sighting& sighting) {
+  const auto landmark = seen_first(x, sighting.z);
+  if (!landmark) return;
+  const auto number = sighting.identity.value_or(static_cast<std::uint32_t>(landmarks_.size()));
+  if (find(number) != nullptr) return;  // named twice in one observation
+  landmarks_.write(number) = {*landmark, gained_odds(x, landmark->mean), 1};
+  ++size_;
+  file(number, true);
+}
+
+template <LandmarkSensor L>
+void LandmarkMap<L>::remove(std::uint32_t number) {
+  if constexpr (is_placed) places_.tree.erase(places_.filed[number], number);
+  landmarks_.write(number).sightings = 0;
+  --size_;
+}
+
+template <LandmarkSensor L>
+void LandmarkMap<L>::file(std::uint32_t number, bool is_new) {
+  if constexpr (is_placed) {
+    const Gaussian<Landmark>& belief = find(number)->belief;
+    typename SharedKdTree<places>::Point at;
+    bool moved = is_new;
+    for (int a = 0; a < places; ++a) {
+      const auto i = static_cast<std::size_t>(a);
+      at[i] = static_cast<double>(belief.mean(a));
+      moved = moved || std::abs(at[i] - places_.filed[number][i]) > options().filing_distance;
+      places_.widest = std::max(places_.widest, std::sqrt(static_cast<double>(belief.covariance(a, a))));
+    }
+    if (!moved) return;
+    if (!is_new) places_.tree.erase(places_.filed[number], number);
+    places_.tree.insert(at, number);
+    places_.filed.write(number) = at;
+  }
+}
+
+/// What a sighting adds to the log odds: how much more likely it is of a landmark than of none.
+template <LandmarkSensor L>
+double LandmarkMap<L>::gained_odds(const Pose& x, const Landmark& m) const {
+  double detected = 0;
+  if constexpr (requires(const L& l) { l.detection_probability(x, m); })
+    detected = common_->sensor.detection_probability(x, m);
+  return std::max(options().seen, std::log(detected / options().false_share));
+}
+
+/// Whatever was surely in view and not seen is less likely to be there.
+template <LandmarkSensor L>
+void LandmarkMap<L>::miss(const Pose& x, const Choice& seen) {
+  if constexpr (requires(const L& l, const Landmark& m) { l.detection_probability(x, m); }) {
+    for (const std::uint32_t number : in_view(x)) {
+      if (std::find(seen.begin(), seen.end(), number) != seen.end()) continue;
+      const MappedLandmark<Landmark>& landmark = *find(number);
+      const double detected = certain_detection(x, landmark.belief);
+      if (detected <= options().false_share) continue;
+      const double odds =
+          landmark.log_odds + std::log((1 - std::min(detected, 0.999)) / (1 - options().false_share));
+      if (odds < options().remove_below)
+        remove(number);
+      else
+        landmarks_.write(number).log_odds = odds;
+    }
+  }
+}
+
+template <LandmarkSensor L>
+std::vector<std::uint32_t> LandmarkMap<L>::in_view(const Pose& x) const {
+  std::vector<std::uint32_t> numbers;
+  if constexpr (is_placed && requires(const L& l) {
+                  l.reach();
+                  x.translation();
+                }) {
+    typename SharedKdTree<places>::Point low, high;
+    for (int a = 0; a < places; ++a) {
+      const double half = common_->sensor.reach() + options().filing_distance;
+      low[static_cast<std::size_t>(a)] = x.translation()(a) - half;
+      high[static_cast<std::size_t>(a)] = x.translation()(a) + half;
+    }
+    places_.tree.for_each_in_box(low, high, [&](std::uint32_t n, const auto&) { numbers.push_back(n); });
+    std::sort(numbers.begin(), numbers.end());
+  } else {
+    for_each([&](std::uint32_t n, const auto&) { numbers.push_back(n); });
+  }
+  return numbers;
+}
+
+/// The least probability of detection over the mean and the ends of a standard deviation along each axis: at
+/// the rim of the field of view nothing is certain.
+template <LandmarkSensor L>
+double LandmarkMap<L>::certain_detection(const Pose& x, const Gaussian<Landmark>& landmark) const {
+  double least = common_->sensor.detection_probability(x, landmark.mean);
+  for (int a = 0; a < dof<Landmark>; ++a)
+    for (const double sign : {-1.0, 1.0}) {
+      Tangent<Landmark> d = Tangent<Landmark>::Zero();
+      d(a) = sign * std::sqrt(landmark.covariance(a, a));
+      least = std::min(least, common_->sensor.detection_probability(x, retract(landmark.mean, d)));
+    }
+  return least;
+}
+
+}}  // namespace cairn::CAIRN_ABI

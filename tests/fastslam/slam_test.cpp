@@ -1,0 +1,197 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+// The example's logs, runs and batch estimate.
+#include "slam.hpp"
+
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include <cairn/core/statistics.hpp>
+#include <cairn/filter/gaussian.hpp>
+
+#include "batch.hpp"
+#include "ekf_slam.hpp"
+#include "support/data.hpp"
+#include "support/folder.hpp"
+#include "support/random.hpp"
+
+namespace fastslam_test {
+namespace {
+
+using namespace fastslam;
+using cairn::SE2;
+using cairn::Vector;
+
+/// What reading throws, or nothing.
+template <class Read>
+std::string complaint(const Read& read) {
+  try {
+    static_cast<void>(read());
+  } catch (const cairn::Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+void put_robot(const cairn_test::Folder& folder, const std::string& odometry, const std::string& sightings) {
+  folder.put("Robot1_Odometry.dat", odometry);
+  folder.put("Robot1_Measurement.dat", sightings);
+  folder.put("Robot1_Groundtruth.dat", "# truth\n0 1 2 0\n10 2 2 0\n");
+  folder.put("Barcodes.dat", "6 63\n2 14\n");
+  folder.put("Landmark_Groundtruth.dat", "6 1 1 0 0\n");
+}
+
+std::vector<SE2> frame_poses(const LandmarkLog& log, const std::vector<cairn::StampedPose2>& path) {
+  std::vector<SE2> poses;
+  for (const auto& p : path)
+    if (poses.size() < log.frames.size() && p.time == log.frames[poses.size()].time) poses.push_back(p.pose);
+  return poses;
+}
+
+}  // namespace
+
+TEST_SUITE("fastslam/slam") {
+  TEST_CASE("fastslam: both proposals map the simulated loop far better than odometry, named or not") {
+    for (const bool known : {true, false})
+      for (const ProposalKind kind : {ProposalKind::motion, ProposalKind::landmarks}) {
+        LandmarkLog log = simulated(loop_map(), 2, 400);
+        if (!known) log.withhold_identities();
+        const Results r = run(log, {.particles = 60, .seed = 3, .proposal = kind});
+        CAPTURE(known);
+        MESSAGE("path ", *r.path_error, " m, odometry ", *r.odometry_error, " m, ", r.landmarks.size(),
+                " landmarks");
+        CHECK(*r.path_error < 0.5 * *r.odometry_error);
+        CHECK(*r.path_error < 0.4);
+        CHECK(r.landmarks.size() <= 52);
+        CHECK(r.landmarks.size() >= 40);
+        CHECK(r.landmark_error.has_value() == known);
+      }
+  }
+
+  TEST_CASE("fastslam: the batch estimate is where every slope is zero, and no worse than the truth") {
+    const LandmarkLog log = simulated(loop_map(), 4, 120);
+    const SE2 begin = log.truth.front().pose * log.frames.front().moved.mean.inverse();
+    std::vector<SE2> start, truth;
+    for (std::size_t k = 0; k < log.frames.size(); ++k) {
+      start.push_back(k == 0 ? log.frames[0].moved.mean : start.back() * log.frames[k].moved.mean);
+      truth.push_back(begin.inverse() * log.truth[k].pose);
+    }
+    const BatchOptimum best = batch_optimum(log, start);
+    CHECK(best.converged);
+    const BatchOptimum again = batch_optimum(log, truth);
+    CHECK(again.cost == doctest::Approx(best.cost).epsilon(1e-6));
+    CHECK(growing_batch_optimum(log, 25).cost == doctest::Approx(best.cost).epsilon(1e-6));
+    // twice the cost is chi-square of numbers seen and moved, less those estimated
+    double numbers = 0;
+    for (const Frame& frame : log.frames) numbers += 2.0 * static_cast<double>(frame.seen.size());
+    numbers -= 2.0 * static_cast<double>(best.landmarks.size());
+    CHECK(2 * best.cost == doctest::Approx(numbers).epsilon(6 * std::sqrt(2 / numbers)));
+    // FastSLAM's mean is near it, and less likely
+    const Results r = run(log, {.particles = 50, .seed = 2});
+    const std::vector<SE2> path = frame_poses(log, r.mean);
+    REQUIRE(path.size() == best.poses.size());
+    double sum = 0;
+    for (std::size_t k = 0; k < path.size(); ++k)
+      sum += (path[k].translation() - best.poses[k].translation()).squaredNorm();
+    CHECK(std::sqrt(sum / static_cast<double>(path.size())) < 0.3);
+    CHECK_THROWS_AS(static_cast<void>(batch_optimum(log, {})), cairn::Error);
+  }
+
+  TEST_CASE("fastslam: with the start known NEES is about its number of dimensions, for both filters") {
+    cairn::RunningMoments particles, joint;
+    for (std::uint64_t seed = 1; seed <= 6; ++seed) {
+      const LandmarkLog log = simulated(loop_map(), seed, 80);
+      const Results r = run(log, {.particles = 100, .seed = seed});
+      const EkfSlamRun ekf = ekf_slam(log);
+      for (std::size_t k = 19; k < 80; k += 20) {
+        particles.add(*r.steps[k].nees);
+        joint.add(cairn::nees(ekf.poses[k], log.start->inverse() * log.truth[k].pose));
+      }
+    }
+    MESSAGE("FastSLAM ", particles.mean(), ", EKF-SLAM ", joint.mean());
+    for (const auto* nees : {&particles, &joint}) {
+      CHECK(nees->mean() > 1.2);
+      CHECK(nees->mean() < 6);
+    }
+  }
+
+  TEST_CASE("fastslam: the log of a robot is read, and what belongs to nothing is said") {
+    const cairn_test::Folder folder;
+    put_robot(folder, "# odometry\r\n0 1 0\r\n1 1 0\r\n2 1 0\r\n3 0 0\r\n",
+              "1.5 63 2 0.1\n1.5 14 1 0\n2.5 99 1 0\n2.5 63 1 0.2\n");
+    const LandmarkLog log = read_mrclam(folder / "", 1);
+    REQUIRE(log.frames.size() == 2);
+    CHECK(log.frames[0].time == 1.5);
+    CHECK(log.frames[0].moved.mean.x() == doctest::Approx(1.5));
+    REQUIRE(log.frames[0].seen.size() == 1);  // the other is a robot
+    CHECK(log.frames[0].seen[0].identity == 6);
+    CHECK(log.frames[1].moved.mean.x() == doctest::Approx(1.0));
+    CHECK(log.between.size() == 2);
+    CHECK(log.between[0].moved.x() == doctest::Approx(0.5));
+    REQUIRE(log.notes.size() == 1);
+    CHECK(log.notes[0].find("99") != std::string::npos);
+    const Results r = run(log, {.particles = 3});
+    CHECK(r.mean.size() == 4);
+  }
+
+  TEST_CASE("fastslam: bad logs are refused in words that name file and line") {
+    const cairn_test::Folder folder;
+    const auto robot = [&] { return read_mrclam(folder / "", 1); };
+    put_robot(folder, "", "1.5 63 2 0.1\n");
+    CHECK(complaint(robot).find("odometry") != std::string::npos);
+    put_robot(folder, "0 1 0\n2 1 0\n", "1.5 63 2 nan\n");
+    CHECK(complaint(robot).find("Robot1_Measurement.dat:1") != std::string::npos);
+    put_robot(folder, "0 1 0\n2 1\n", "1.5 63 2 0\n");
+    CHECK(complaint(robot).find("Robot1_Odometry.dat:2") != std::string::npos);
+    put_robot(folder, "2 1 0\n0 1 0\n", "1.5 63 2 0\n");
+    CHECK(complaint(robot).find("times") != std::string::npos);
+    put_robot(folder, "0 1 0\n2 1 0\n", "1.5 99 2 0\n");
+    CHECK(complaint(robot).find("saw no landmark") != std::string::npos);
+    CHECK(complaint([&] { return read_mrclam(folder / "none", 1); }) != "");
+
+    const auto graph = [&](const std::string& text) {
+      folder.put("graph.txt", text);
+      return complaint([&] { return read_graph(folder / "graph.txt"); });
+    };
+    const std::string move = "ODOMETRY 0 1 1 0 0 0.1 0 0 0.1 0 0.1\n";
+    CHECK(graph(move + "LANDMARK 1 2 3 4 0.4 0 0.4\n") == "");
+    CHECK(graph("").find("odometry") != std::string::npos);
+    CHECK(graph(move).find("sightings") != std::string::npos);
+    CHECK(graph("LANDMARK 1 2 3 4 0.4 0 0.4\n").find(":1") != std::string::npos);
+    CHECK(graph(move + "LANDMARK 7 2 3 4 0.4 0 0.4\n").find("newest pose") != std::string::npos);
+    CHECK(graph(move + "LANDMARK 1 2 nan 4 0.4 0 0.4\n").find("finite") != std::string::npos);
+    CHECK(graph(move + "LANDMARK 1 4294967295 3 4 0.4 0 0.4\n").find("2^24") != std::string::npos);
+    CHECK(graph(move + "LANDMARK 1 2 3 4 0.4 0.1 0.4\n").find("covariance") != std::string::npos);
+    CHECK(graph("ODOMETRY 0 1 1 0 0 0.1 0 0 0 0 0.1\n").find("every direction") != std::string::npos);
+    CHECK(graph("VERTEX 0\n").find("ODOMETRY or LANDMARK") != std::string::npos);
+
+    const auto map = [&](const std::string& text) {
+      folder.put("map.mat", text);
+      return complaint([&] { return read_point_map(folder / "map.mat"); });
+    };
+    CHECK(map("lm 2 1\n1 2\n\nwp 2 2\n0 0\n1 1\n") == "");
+    CHECK(map("").find("the file ends before") != std::string::npos);
+    CHECK(map("lm 2 0\nwp 2 1\n0 0\n") != "");
+    CHECK(map("lm 2 3\n1 2\n") != "");
+    CHECK(map("lm 2 1\n1 inf\nwp 2 1\n0 0\n").find(":2") != std::string::npos);
+  }
+
+  TEST_CASE("fastslam: robots in a hall, their landmarks unknown but for who they are") {
+    const auto folder = cairn_test::real_data("mrclam_7");
+    if (!folder) return;
+    for (const int robot : {1, 2, 3}) {
+      const Results r = run(read_mrclam(*folder, robot), {.particles = 20, .seed = 1});
+      MESSAGE("robot ", robot, ": path ", *r.path_error, " m, landmarks ", *r.landmark_error, " m");
+      CHECK(*r.path_error < 0.4);
+      CHECK(*r.landmark_error < 0.3);
+      CHECK(*r.odometry_error > 1);
+    }
+  }
+}
+
+}  // namespace fastslam_test

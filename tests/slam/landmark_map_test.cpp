@@ -1,0 +1,496 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+#include <Eigen/LU>
+#include <doctest/doctest.h>
+
+#include <cairn/manifold/se2.hpp>
+#include <cairn/models/sensor.hpp>
+#include <cairn/slam/landmark_map.hpp>
+
+#include "support/random.hpp"
+
+namespace landmark_map_test {
+namespace {
+
+using namespace cairn;
+using Plane = Vector<2>;
+
+/// A robot that only shifts sees where landmarks are from it.
+struct Relative {
+  using State = Plane;
+  using Part = Plane;
+  using Measurement = Plane;
+  Matrix<2> covariance = (Matrix<2>() << 0.05, 0.01, 0.01, 0.08).finished();
+  double view = 3, probability = 0.5;
+
+  [[nodiscard]] Measurement predict(const State& x, const Part& m) const { return m - x; }
+  [[nodiscard]] Matrix<2> part_jacobian(const State&, const Part&) const { return Matrix<2>::Identity(); }
+  [[nodiscard]] Matrix<2> state_jacobian(const State&, const Part&) const { return -Matrix<2>::Identity(); }
+  [[nodiscard]] Matrix<2> noise(const State&, const Part&) const { return covariance; }
+  [[nodiscard]] Part initialise(const State& x, const Measurement& z) const { return x + z; }
+  [[nodiscard]] double detection_probability(const State& x, const Part& m) const {
+    return (m - x).norm() < view ? probability : 0;
+  }
+};
+
+/// Range and bearing of a point.
+struct Polar {
+  using State = SE2;
+  using Part = Plane;
+  using Measurement = RangeBearing::Measurement;
+  [[nodiscard]] Measurement predict(const State& x, const Part& m) const {
+    return RangeBearing{.beacon = m}.predict(x);
+  }
+  [[nodiscard]] Matrix<2, 3> state_jacobian(const State& x, const Part& m) const {
+    return RangeBearing{.beacon = m}.jacobian(x);
+  }
+  [[nodiscard]] Matrix<2> part_jacobian(const State& x, const Part& m) const {
+    return -state_jacobian(x, m).leftCols<2>() * x.rotation().inverse().matrix();
+  }
+  [[nodiscard]] Matrix<2> noise(const State&, const Part&) const {
+    return Vector<2>(0.01, 4e-4).asDiagonal();
+  }
+  [[nodiscard]] Part initialise(const State& x, const Measurement& z) const {
+    const double range = z.part<0>()(0), bearing = z.part<1>().angle();
+    return x * Plane(range * std::cos(bearing), range * std::sin(bearing));
+  }
+};
+
+using Map = LandmarkMap<Relative>;
+const Matrix<2> motion_noise = (Matrix<2>() << 0.3, -0.1, -0.1, 0.2).finished();
+const auto motion = [](const Plane& x, std::size_t) {
+  return Gaussian<Plane>{x + Plane(0.5, 0.1), motion_noise};
+};
+
+Plane normal(const Matrix<2>& covariance, Random& random) {
+  return sample(Gaussian<Plane>{Plane::Zero(), covariance}, random);
+}
+
+/// Kalman's filter of the pose and all landmarks in one dense matrix: shares nothing with the particles.
+struct Joint {
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(2);
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(2, 2);
+  std::map<std::uint32_t, int> row_of{};
+  double log_evidence = 0;
+
+  void move() {
+    mean.head(2) += Plane(0.5, 0.1);
+    covariance.topLeftCorner(2, 2) += motion_noise;
+  }
+  void see(std::uint32_t id, const Plane& z, const Matrix<2>& r) {
+    const auto known = row_of.find(id);
+    const int n = static_cast<int>(mean.size());
+    if (known == row_of.end()) {
+      Eigen::MatrixXd grown(n + 2, n + 2);
+      grown.topLeftCorner(n, n) = covariance;
+      grown.bottomLeftCorner(2, n) = covariance.topRows(2);
+      grown.topRightCorner(n, 2) = covariance.leftCols(2);
+      grown.bottomRightCorner(2, 2) = covariance.topLeftCorner(2, 2) + r;
+      covariance = grown;
+      mean.conservativeResize(n + 2);
+      mean.tail(2) = mean.head(2) + z;
+      row_of[id] = n;
+      return;
+    }
+    Eigen::MatrixXd h = Eigen::MatrixXd::Zero(2, n);
+    h.leftCols(2) = -Matrix<2>::Identity();
+    h.middleCols(known->second, 2) = Matrix<2>::Identity();
+    const Matrix<2> s = h * covariance * h.transpose() + r;
+    const Matrix<2> s_inverse = s.inverse();
+    const Plane v = z - h * mean;
+    const Eigen::MatrixXd gain = covariance * h.transpose() * s_inverse;
+    mean += gain * v;
+    covariance -= gain * s * gain.transpose();
+    log_evidence -= 0.5 * (v.dot(s_inverse * v) + std::log(s.determinant())) + std::log(2 * std::numbers::pi);
+  }
+};
+
+const std::vector<Plane> landmarks{{1, 1}, {-1, 2}, {2, -1}, {0, 3}, {3, 0}};
+
+Map::Observation seen_from(const Plane& x, Random& random) {
+  Map::Observation z;
+  for (std::uint32_t i = 0; i < landmarks.size(); ++i)
+    z.push_back({landmarks[i] - x + normal(Relative{}.covariance, random), i});
+  return z;
+}
+
+const LandmarkOptions keep_all{.gate = 1 - 1e-12};
+
+/// A drive of a few steps, the same for every filter.
+struct Drive {
+  std::vector<Map::Observation> seen{};
+  Joint exact{};
+};
+Drive drive(std::uint64_t seed) {
+  Random random(seed);
+  Drive d;
+  Plane is = Plane::Zero();
+  for (int step = 0; step < 4; ++step) {
+    is += Plane(0.5, 0.1) + normal(motion_noise, random);
+    d.seen.push_back(seen_from(is, random));
+    d.exact.move();
+    for (const auto& s : d.seen.back()) d.exact.see(*s.identity, s.z, Relative{}.covariance);
+  }
+  return d;
+}
+
+/// Squared distance of the particles' mean pose and landmarks from the joint filter's.
+double squared_error(const Drive& d, std::size_t count, std::uint64_t seed) {
+  MappedPaths<Map> belief(Plane::Zero(), Map({}, keep_all), count);
+  const ConditionalFilter filter{.seed = seed};
+  for (const auto& z : d.seen) REQUIRE(filter.step(belief, motion, FromLandmarks{}, z).accepted());
+  Eigen::VectorXd mean = Eigen::VectorXd::Zero(d.exact.mean.size());
+  const std::vector<double> weights = belief.particles().weights();
+  for (std::size_t i = 0; i < count; ++i) {
+    mean.head(2) += weights[i] * belief[i].pose;
+    for (const auto& [id, row] : d.exact.row_of)
+      mean.segment(row, 2) += weights[i] * belief[i].map.find(id)->belief.mean;
+  }
+  return (mean - d.exact.mean).squaredNorm();
+}
+
+/// A map of the landmarks as seen once from the origin.
+template <class M = Map>
+M seen_once(Random& random, const LandmarkOptions& options = keep_all) {
+  M map({}, options);
+  map.insert(Plane::Zero(), seen_from(Plane::Zero(), random));
+  return map;
+}
+
+/// All injective associations of sightings with landmarks inside the gate, or with none of the map; calls
+/// visit(association, log likelihood).
+template <class Visit>
+void enumerate(const Map& map, const Plane& x, const Map::Observation& z, double gate, Association& n,
+               double sum, const Visit& visit) {
+  const std::size_t k = n.size();
+  if (k == z.size()) {
+    visit(n, sum);
+    return;
+  }
+  const auto go_on = [&](std::uint32_t number, double log_density) {
+    n.push_back(number);
+    enumerate(map, x, z, gate, n, sum + log_density, visit);
+    n.pop_back();
+  };
+  map.for_each([&](std::uint32_t number, const auto& landmark) {
+    if (std::find(n.begin(), n.end(), number) != n.end()) return;
+    const Matrix<2> s = landmark.belief.covariance + map.sensor().covariance;
+    const Plane v = z[k].z - (landmark.belief.mean - x);
+    const double nis = v.dot(s.inverse() * v);
+    if (nis <= gate) go_on(number, -0.5 * (nis + std::log(s.determinant())) - std::log(2 * std::numbers::pi));
+  });
+  go_on(new_landmark, std::log(map.options().new_density));
+}
+
+Map::Observation without_identity(Map::Observation z) {
+  for (auto& s : z) s.identity.reset();
+  return z;
+}
+
+/// Bytes of a run without identities: poses, weights, landmarks.
+std::vector<double> run(unsigned threads, Pick pick) {
+  Random random(3);
+  MappedPaths<Map> belief(Plane::Zero(), Map({}, {.pick = pick, .gate = 0.999}), 23);
+  const ConditionalFilter filter{.resample_below = 0.8, .seed = 4, .threads = threads};
+  Plane is = Plane::Zero();
+  for (int step = 0; step < 20; ++step) {
+    is += Plane(0.05, 0.01);
+    REQUIRE(filter
+                .step(
+                    belief,
+                    [](const Plane& x, std::size_t) {
+                      return Gaussian<Plane>{x + Plane(0.05, 0.01), 0.01 * motion_noise};
+                    },
+                    FromLandmarks{}, without_identity(seen_from(is, random)))
+                .accepted());
+  }
+  std::vector<double> all = belief.particles().log_weights;
+  for (std::size_t i = 0; i < belief.size(); ++i) {
+    all.insert(all.end(), {belief[i].pose(0), belief[i].pose(1)});
+    belief[i].map.for_each([&](std::uint32_t number, const auto& landmark) {
+      all.insert(all.end(), {double(number), landmark.belief.mean(0), landmark.belief.mean(1),
+                             landmark.belief.covariance(0, 1), landmark.log_odds});
+    });
+  }
+  return all;
+}
+
+}  // namespace
+
+TEST_SUITE("slam/landmark_map") {
+  TEST_CASE("landmark_map: in the linear case a particle's proposal is Kalman's posterior given its past") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const Map::Observation first = seen_from(Plane::Zero(), random),
+                           second = seen_from(Plane(0.8, 0), random);
+    Joint exact;
+    for (const auto& s : first) exact.see(*s.identity, s.z, Relative{}.covariance);
+    exact.move();
+    for (const auto& s : second) exact.see(*s.identity, s.z, Relative{}.covariance);
+    Map map({}, keep_all);
+    map.insert(Plane::Zero(), first);
+    Map::Observation order = second;
+    for (int run = 0; run < 20; ++run) {
+      std::rotate(order.begin(), order.begin() + 1 + run % 3, order.end());
+      const auto by_weight = [&](FromLandmarks::Weight weight) {
+        Random same(seed + static_cast<std::uint64_t>(run));
+        return FromLandmarks{.weight = weight}(map, motion(Plane::Zero(), 0), order, same);
+      };
+      const auto proposed = by_weight(FromLandmarks::Weight::exact);
+      CHECK((proposed.drawn_from.mean - exact.mean.head(2)).norm() < 1e-12);
+      CHECK((proposed.drawn_from.covariance - exact.covariance.topLeftCorner(2, 2)).norm() < 1e-12);
+      // both weights are the evidence, whatever pose was drawn
+      CHECK(std::abs(proposed.log_weight - exact.log_evidence) <
+            1e-12 * std::abs(exact.log_evidence) + 1e-12);
+      CHECK(std::abs(by_weight(FromLandmarks::Weight::evidence).log_weight - proposed.log_weight) < 1e-12);
+    }
+  }
+
+  TEST_CASE("landmark_map: the error to the exact posterior falls with the root of the number of particles") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    const Drive d = drive(seed);
+    std::vector<double> logs, errors;
+    for (const std::size_t count : {30U, 300U, 3000U}) {
+      double sum = 0;
+      const int runs = count < 1000 ? 60 : 30;
+      for (int run = 0; run < runs; ++run)
+        sum += squared_error(d, count, seed * 1000 + static_cast<std::uint64_t>(run)) / runs;
+      logs.push_back(std::log(double(count)));
+      errors.push_back(0.5 * std::log(sum));
+    }
+    const double slope = (errors[2] - errors[0]) / (logs[2] - logs[0]);
+    MESSAGE("slope ", slope);
+    CHECK(slope == doctest::Approx(-0.5).epsilon(0.2));  // +-0.1
+    CHECK(std::exp(errors[2]) < 0.1);
+  }
+
+  TEST_CASE("landmark_map: the likeliest association is the best of all injective ones") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const double gate = chi_square_quantile(0.999, 2);
+    int several = 0;
+    for (int run = 0; run < 60; ++run) {
+      const Map map = seen_once(random, {.gate = 0.999, .new_density = 0.02});
+      const Plane x = normal(0.3 * motion_noise, random);
+      Map::Observation z = without_identity(seen_from(x, random));
+      z[1].z = z[0].z + normal(0.3 * motion_noise, random);  // two of one, or nearly
+      double best = -std::numeric_limits<double>::infinity();
+      Association n, best_n;
+      int count = 0;
+      enumerate(map, x, z, gate, n, 0, [&](const Association& each, double l) {
+        ++count;
+        if (l <= best) return;
+        best = l;
+        best_n = each;
+      });
+      several += count > 2 ? 1 : 0;
+      const auto chosen = map.choose(x, z, random);
+      CHECK(chosen.choice == best_n);
+      CHECK(chosen.log_likelihood == doctest::Approx(best).epsilon(1e-12));
+      CHECK(map.log_likelihood(x, z, chosen.choice) == doctest::Approx(best).epsilon(1e-12));
+      CHECK(map.log_likelihood(x, z) == doctest::Approx(best).epsilon(1e-12));
+    }
+    CHECK(several > 30);
+  }
+
+  TEST_CASE("landmark_map: drawn associations, weighed, sum to the likelihood over all associations") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    const Map map = seen_once(random, {.pick = Pick::drawn, .gate = 0.999, .new_density = 0.05});
+    const Plane x(0.2, -0.1);
+    Map::Observation z = without_identity(seen_from(x, random));
+    z.resize(3);
+    z[1].z = z[0].z + Plane(0.2, 0.1);
+    double sum = 0;
+    Association n;
+    enumerate(map, x, z, chi_square_quantile(0.999, 2), n, 0,
+              [&](const Association&, double l) { sum += std::exp(l); });
+    RunningMoments weights;
+    std::map<Association, int> met;
+    for (int draw = 0; draw < 20000; ++draw) {
+      const auto chosen = map.choose(x, z, random);
+      weights.add(std::exp(chosen.log_likelihood - chosen.log_probability) / sum);
+      ++met[chosen.choice];
+    }
+    CHECK(met.size() > 1);
+    CHECK(std::abs(weights.mean() - 1) < 5 * weights.standard_deviation() / std::sqrt(20000.0) + 1e-12);
+  }
+
+  TEST_CASE("landmark_map: of many landmarks a sighting finds the likeliest, as looking at all does") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    Random random(seed);
+    Map map({}, {.gate = 0.999, .new_density = 1e-9, .clutter_density = 1e-9});
+    std::vector<Plane> all;
+    for (std::uint32_t i = 0; i < 400; ++i) {
+      all.emplace_back(random.uniform(-20, 20), random.uniform(-20, 20));
+      for (int twice = 0; twice < 3; ++twice) {  // the second time it is known, and moves
+        const Plane z = all.back() + normal(Relative{}.covariance, random);
+        map.insert(Plane::Zero(), {{z, i}}, {twice == 0 ? new_landmark : i});
+      }
+    }
+    const Matrix<2> spread = 0.2 * motion_noise;
+    int found = 0;
+    for (int run = 0; run < 500; ++run) {
+      const Plane x = normal(25 * motion_noise, random);
+      const Plane z = all[random.below(400)] - x + 2 * normal(motion_noise, random);
+      std::uint32_t best = new_landmark;
+      double least = std::numeric_limits<double>::infinity();
+      map.for_each([&](std::uint32_t number, const auto& landmark) {
+        const Matrix<2> s = landmark.belief.covariance + spread + Relative{}.covariance;
+        const Plane v = z - (landmark.belief.mean - x);
+        const double nis = v.dot(s.inverse() * v), cost = nis + std::log(s.determinant());
+        if (nis > chi_square_quantile(0.999, 2) || cost >= least) return;
+        least = cost;
+        best = number;
+      });
+      found += best == new_landmark ? 0 : 1;
+      CHECK(map.associate({x, spread}, {{z, {}}}, random).choice == Association{best});
+    }
+    CHECK(found > 200);
+    CHECK(found < 500);
+  }
+
+  TEST_CASE(
+      "landmark_map: what is not seen where it should be goes; what is out of view or at its rim stays") {
+    Map map;
+    const auto seen_at = [](double x, double y) { return Map::Sighting{Plane(x, y), {}}; };
+    map.insert(Plane::Zero(), {seen_at(1, 0), seen_at(2.95, 0), seen_at(8, 0), seen_at(0, 1)});
+    REQUIRE(map.size() == 4);
+    for (int step = 0; step < 20; ++step) map.insert(Plane::Zero(), {seen_at(0, 1)});
+    CHECK(map.find(0) == nullptr);
+    CHECK(map.find(1) != nullptr);
+    CHECK(map.find(2) != nullptr);
+    REQUIRE(map.find(3) != nullptr);
+    CHECK(map.find(3)->sightings == 21);
+    CHECK(map.find(3)->log_odds == doctest::Approx(map.options().most_log_odds));
+    CHECK(map.size() == 3);
+    map.insert(Plane::Zero(), {seen_at(1, 0)});  // a number that went is not given again
+    CHECK(map.find(0) == nullptr);
+    CHECK(map.find(4) != nullptr);
+    // sightings with names say nothing of what was not named
+    const double odds = map.find(4)->log_odds;
+    map.insert(Plane::Zero(), {{Plane(0, 1), 3}});
+    CHECK(map.find(4)->log_odds == odds);
+  }
+
+  TEST_CASE("landmark_map: a named landmark outside its gate is clutter, and none is seen twice at once") {
+    Random random(1);
+    Map map({}, {.gate_of_named = 0.99});
+    map.insert(Plane::Zero(), {{Plane(1, 0), 7}});
+    CHECK(Map().choose(Plane::Zero(), {{Plane(4, 0), 7}}, random).choice == Association{new_landmark});
+    CHECK(map.find(7) != nullptr);
+    CHECK(map.choose(Plane::Zero(), {{Plane(4, 0), 7}}, random).choice == Association{no_landmark});
+    const auto twice = map.choose(Plane::Zero(), {{Plane(1.1, 0), 7}, {Plane(1, 0), 7}}, random).choice;
+    CHECK(twice == Association{no_landmark, 7});
+    map.insert(Plane::Zero(), {{Plane(4, 0), 7}});
+    CHECK(map.find(7)->sightings == 1);
+    map.insert(Plane::Zero(), {{Plane(5, 0), 9}, {Plane(5, 0), 9}});
+    CHECK(map.find(9)->sightings == 1);
+    CHECK(map.size() == 2);
+    Map trusting;  // takes a name for true, wherever the landmark is seen
+    trusting.insert(Plane::Zero(), {{Plane(1, 0), 7}});
+    CHECK(trusting.choose(Plane::Zero(), {{Plane(90, 0), 7}}, random).choice == Association{7});
+  }
+
+  TEST_CASE("landmark_map: the same bytes for 1, 2 and 7 threads") {
+    for (const Pick pick : {Pick::likeliest, Pick::drawn}) {
+      const std::vector<double> one = run(1, pick);
+      CHECK(one.size() > 23 * 10);
+      CHECK(one == run(2, pick));
+      CHECK(one == run(7, pick));
+    }
+  }
+
+  TEST_CASE("landmark_map: where the sensor bends, drawn poses keep their weights exact") {
+    // FastSLAM 1.0 and 2.0 with many particles agree on the posterior of one step.
+    Random random(5);
+    LandmarkMap<Polar> map({}, keep_all);
+    const std::vector<Plane> places{{4, 1}, {3, -2}, {1, 3}};
+    LandmarkMap<Polar>::Observation first, second;
+    const SE2 is(0.35, 0.05, 0.25);
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      first.push_back({Polar{}.predict(SE2(), places[i]), i});
+      second.push_back({Polar{}.predict(is, places[i]), i});
+    }
+    map.insert(SE2(), first);
+    const auto move = [](const SE2&, std::size_t) {
+      return Gaussian<SE2>{SE2(0.2, 0, 0.1), Vector<3>(0.04, 0.01, 0.04).asDiagonal()};
+    };
+    const auto posterior = [&](const auto& proposal, std::size_t count) {
+      MappedPaths<LandmarkMap<Polar>> belief(SE2(), map, count);
+      REQUIRE((
+          ConditionalFilter{.resample_below = 0, .seed = 8}.step(belief, move, proposal, second).accepted()));
+      Particles<SE2> poses;
+      for (std::size_t i = 0; i < count; ++i) poses.states.push_back(belief[i].pose);
+      poses.log_weights = belief.particles().log_weights;
+      return moments(poses);
+    };
+    const Gaussian<SE2> one = posterior(FromMotion{}, 60000), two = posterior(FromLandmarks{}, 10000),
+                        more = posterior(FromLandmarks{.iterations = 5}, 10000);
+    CHECK(local(one.mean, two.mean).norm() < 0.006);
+    CHECK(local(one.mean, more.mean).norm() < 0.006);
+    CHECK((one.covariance - two.covariance).norm() < 0.1 * one.covariance.norm());
+  }
+
+  TEST_CASE("landmark_map: bad input is refused in words") {
+    Random random(1);
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    LandmarkMap<Polar> map;
+    const auto bad = [&](const LandmarkMap<Polar>::Observation& z) {
+      static_cast<void>(map.choose(SE2(), z, random));
+    };
+    CHECK_THROWS_AS(bad({{RangeBearing::measurement(nan, 0), {}}}), Error);
+    CHECK_THROWS_AS(bad({{RangeBearing::measurement(1, nan), {}}}), Error);
+    CHECK_THROWS_AS(bad({{RangeBearing::measurement(1, 0), LandmarkMap<Polar>::most_identity}}), Error);
+    CHECK_THROWS_AS((LandmarkMap<Polar>({}, {.gate = 1})), Error);
+    CHECK_THROWS_AS((LandmarkMap<Polar>({}, {.new_density = 0})), Error);
+    CHECK_THROWS_AS((LandmarkMap<Polar>({}, {.remove_below = nan})), Error);
+    const Gaussian<SE2> singular{SE2(), Vector<3>(0.1, 0, 0.1).asDiagonal()};
+    CHECK_THROWS_AS(static_cast<void>(FromLandmarks{}(map, singular, {}, random)), Error);
+    // an empty map, nothing seen, a robot that stands on what it sees
+    CHECK(map.choose(SE2(), {}, random).choice.empty());
+    map.insert(SE2(), {});
+    map.insert(SE2(), {{RangeBearing::measurement(0, 0), 3}});
+    CHECK(map.size() == 0);
+    CHECK(map.find(new_landmark) == nullptr);
+    const Gaussian<SE2> good{SE2(), 0.01 * Matrix<3>::Identity()};
+    CHECK(std::isfinite(FromLandmarks{}(map, good, {}, random).log_weight));
+  }
+
+  TEST_CASE("landmark_map: an update in a copy of 50,000 landmarks copies few nodes, the others stay") {
+    Map map;
+    Random random(2);
+    for (std::uint32_t i = 0; i < 50000; ++i)
+      map.insert(Plane::Zero(), {{Plane(random.uniform(-500, 500), random.uniform(-500, 500)), i}},
+                 {new_landmark});
+    std::size_t most = 0;
+    for (int particle = 0; particle < 100; ++particle) {
+      Map copy = map;
+      const auto number = static_cast<std::uint32_t>(random.below(50000));
+      const Plane z = map.find(number)->belief.mean + normal(Relative{}.covariance, random);
+      copy.insert(Plane::Zero(), {{z, number}}, {number});
+      most = std::max(most, copy.node_copies() - map.node_copies());
+      REQUIRE(copy.find(number)->sightings == 2);
+      REQUIRE(map.find(number)->sightings == 1);
+    }
+    MESSAGE("at most ", most, " nodes");
+    CHECK(most <= 10);
+  }
+}
+
+}  // namespace landmark_map_test
