@@ -2,12 +2,14 @@
 // SPDX-License-Identifier: MIT
 #include "report.hpp"
 
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <numbers>
 #include <string_view>
 #include <utility>
 
@@ -109,6 +111,31 @@ Json axis(const Axis& axis) {
   return {{"label", axis.label}, {"unit", axis.unit}};
 }
 
+Json curves_of(const std::string& panel, const std::vector<PlaneCurve>& curves) {
+  Json json = Json::array();
+  for (const PlaneCurve& curve : curves) {
+    expect_as_many(curve.y.size(), curve.x.size(), panel, curve.name);
+    json.push_back({{"name", curve.name},
+                    {"ink", name_of(curve.ink)},
+                    {"dots", curve.dots},
+                    {"dashed", curve.dashed},
+                    {"filled", curve.filled},
+                    {"x", rounded_all(curve.x)},
+                    {"y", rounded_all(curve.y)}});
+  }
+  return json;
+}
+
+/// What a plot and a film in the plane have in common.
+template <class Panel>
+Json plane_head(const char* kind, const Panel& panel) {
+  Json json = head(kind, panel);
+  json["x"] = axis(panel.x);
+  json["y"] = axis(panel.y);
+  json["equal_scale"] = panel.equal_scale;
+  return json;
+}
+
 /// The text may stand inside a script element: no '<' is left in it.
 std::string without_tags(const std::string& json) {
   std::string text;
@@ -167,22 +194,46 @@ void Report::add(const LinePlot& panel) {
                               {"dashed", curve.dashed},
                               {"values", rounded_all(curve.values)}});
   }
+  json["bands"] = Json::array();
+  for (const Band& band : panel.bands) {
+    expect_as_many(band.low.size(), panel.x_values.size(), panel.title, band.name);
+    expect_as_many(band.high.size(), panel.x_values.size(), panel.title, band.name);
+    json["bands"].push_back({{"name", band.name},
+                             {"ink", name_of(band.ink)},
+                             {"low", rounded_all(band.low)},
+                             {"high", rounded_all(band.high)}});
+  }
   panels_.push_back(dumped(json));
 }
 
 void Report::add(const PlanePlot& panel) {
-  Json json = head("plane", panel);
+  Json json = plane_head("plane", panel);
+  json["curves"] = curves_of(panel.title, panel.curves);
+  panels_.push_back(dumped(json));
+}
+
+void Report::add(const PlaneFilm& panel) {
+  Json json = plane_head("film", panel);
+  json["slider"] = axis(panel.slider);
+  json["still"] = curves_of(panel.title, panel.still);
+  json["frames"] = Json::array();
+  for (const PlaneFrame& frame : panel.frames)
+    json["frames"].push_back({{"at", rounded(frame.at)},
+                              {"caption", frame.caption},
+                              {"curves", curves_of(panel.title, frame.curves)}});
+  panels_.push_back(dumped(json));
+}
+
+void Report::add(const HeatMap& panel) {
+  expect_as_many(panel.values.size(), panel.columns * panel.rows, panel.title, panel.value.label);
+  Json json = head("heat", panel);
   json["x"] = axis(panel.x);
   json["y"] = axis(panel.y);
-  json["curves"] = Json::array();
-  for (const PlaneCurve& curve : panel.curves) {
-    expect_as_many(curve.y.size(), curve.x.size(), panel.title, curve.name);
-    json["curves"].push_back({{"name", curve.name},
-                              {"ink", name_of(curve.ink)},
-                              {"dots", curve.dots},
-                              {"x", rounded_all(curve.x)},
-                              {"y", rounded_all(curve.y)}});
-  }
+  json["value"] = axis(panel.value);
+  json["columns"] = panel.columns;
+  json["rows"] = panel.rows;
+  json["diverging"] = panel.diverging;
+  json["values"] = rounded_all(panel.values);
   panels_.push_back(dumped(json));
 }
 
@@ -254,6 +305,30 @@ std::optional<std::string> Report::html() const {
   put(page, title_place, escaped_for_html(title_));
   put(page, data_place, without_tags(data()));
   return page;
+}
+
+PlaneCurve ellipse(std::string name, Ink ink, const std::array<double, 2>& mean,
+                   const std::array<double, 3>& covariance, double sigmas) {
+  const auto [xx, xy, yy] = covariance;
+  const double left_over = xx > 0 ? yy - xy * xy / xx : yy;  // of y's variance once x is known
+  if (!(xx >= 0 && left_over >= -1e-9 * yy && (xx > 0 || xy == 0)))
+    cairn::raise("ellipse \"" + name +
+                 "\": expected a covariance (xx, xy, yy) without a negative eigenvalue, " + "found (" +
+                 readable(xx) + ", " + readable(xy) + ", " + readable(yy) + ")");
+  // The lower Cholesky factor carries the circle of radius `sigmas` to the ellipse.
+  const double along = std::sqrt(xx);
+  const double across = xx > 0 ? xy / along : 0;
+  const double upwards = std::sqrt(std::max(left_over, 0.0));
+  constexpr int corners = 48;
+  PlaneCurve curve{.name = std::move(name), .ink = ink};
+  for (int corner = 0; corner <= corners; ++corner) {
+    const double angle = 2 * std::numbers::pi * corner / corners;
+    const double u = sigmas * std::cos(angle);
+    const double v = sigmas * std::sin(angle);
+    curve.x.push_back(mean[0] + along * u);
+    curve.y.push_back(mean[1] + across * u + upwards * v);
+  }
+  return curve;
 }
 
 bool has_report_page() noexcept {

@@ -16,6 +16,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -50,6 +51,15 @@ struct Curve {
   bool dashed = false;
 };
 
+/// The room between two curves over the common x values of a LinePlot, such as a mean and two standard
+/// deviations either way.
+struct Band {
+  std::string name = {};
+  Ink ink = Ink::belief;
+  std::vector<double> low = {};  ///< one for each x value, and so for `high`
+  std::vector<double> high = {};
+};
+
 /// Curves over a common axis. The mouse reads values, a dragged range zooms, a double click returns.
 struct LinePlot {
   std::string title = {};
@@ -61,24 +71,69 @@ struct LinePlot {
   bool logarithmic = false;           ///< the y axis; values that are not positive leave gaps
   bool logarithmic_x = false;         ///< the x axis too; all x values must be positive
   bool wide = false;                  ///< over the whole width of the page
+  std::vector<Band> bands = {};       ///< below the curves
 };
 
-/// A line through the plane, or single dots.
+/// A line through the plane, single dots, or an area. Curves of one name have one entry in the legend, which
+/// shows and hides them together.
 struct PlaneCurve {
   std::string name = {};
   Ink ink = Ink::belief;
   std::vector<double> x = {};
   std::vector<double> y = {};
   bool dots = false;
+  bool dashed = false;
+  bool filled = false;  ///< closed, and tinted within
 };
 
-/// Curves in a plane whose two axes have the same scale: a map.
+/// Where `sigmas` standard deviations about a mean (x, y) end, for the covariance (xx, xy, yy): a closed
+/// curve of 48 corners. A covariance with a negative eigenvalue throws cairn::Error naming the curve.
+[[nodiscard]] PlaneCurve ellipse(std::string name, Ink ink, const std::array<double, 2>& mean,
+                                 const std::array<double, 3>& covariance, double sigmas = 2);
+
+/// Curves in a plane: a map, where its two axes have the same scale.
 struct PlanePlot {
   std::string title = {};
   std::string caption = {};
   Axis x = {};
   Axis y = {};
   std::vector<PlaneCurve> curves = {};
+  bool wide = false;
+  bool equal_scale = true;
+};
+
+/// One position of a film's slider.
+struct PlaneFrame {
+  double at = 0;             ///< what the slider measures
+  std::string caption = {};  ///< what happens here
+  std::vector<PlaneCurve> curves = {};
+};
+
+/// Curves in a plane that change along a slider, in one frame for all: moved with the mouse or the arrow
+/// keys, or played. It begins at the last frame.
+struct PlaneFilm {
+  std::string title = {};
+  std::string caption = {};
+  Axis x = {};
+  Axis y = {};
+  Axis slider = {};
+  std::vector<PlaneCurve> still = {};  ///< drawn at every position
+  std::vector<PlaneFrame> frames = {};
+  bool equal_scale = true;
+  bool wide = false;
+};
+
+/// A table of numbers as colours. Values that are not finite are grey.
+struct HeatMap {
+  std::string title = {};
+  std::string caption = {};
+  Axis x = {};
+  Axis y = {};
+  Axis value = {};
+  std::size_t columns = 0;
+  std::size_t rows = 0;
+  std::vector<double> values = {};  ///< row by row, the first at the top
+  bool diverging = false;           ///< blue below zero, orange above; otherwise dark violet to yellow
   bool wide = false;
 };
 
@@ -148,6 +203,8 @@ public:
 
   void add(const LinePlot& panel);
   void add(const PlanePlot& panel);
+  void add(const PlaneFilm& panel);
+  void add(const HeatMap& panel);
   void add(const Picture& panel);
   void add(const Table& panel);
   void add(const Cloud& panel);

@@ -7,14 +7,15 @@ import { Line2 } from 'three/addons/lines/Line2.js';
 import { LineGeometry } from 'three/addons/lines/LineGeometry.js';
 import { LineMaterial } from 'three/addons/lines/LineMaterial.js';
 import { colour, element, floats, onResize, readable, switchable } from './dom.js';
+import { gradient, viridis } from './ramps.js';
 import { onTheme } from './theme.js';
 
-const viridis = ['#440154', '#3b528b', '#21918c', '#5ec962', '#fde725'].map((hex) => new Color(hex));
+const ramp = viridis.map((hex) => new Color(hex));
 
 function rampColour(share, target) {
-  const place = Math.min(Math.max(share, 0), 1) * (viridis.length - 1);
-  const below = Math.min(Math.floor(place), viridis.length - 2);
-  return target.lerpColors(viridis[below], viridis[below + 1], place - below);
+  const place = Math.min(Math.max(share, 0), 1) * (ramp.length - 1);
+  const below = Math.min(Math.floor(place), ramp.length - 2);
+  return target.lerpColors(ramp[below], ramp[below + 1], place - below);
 }
 
 /** The value that this share of the finite numbers lies below. */
@@ -175,8 +176,8 @@ function colourBar(panel, view) {
     const colouring = panel.colourings[choice.value];
     if (!colouring) return;
     const [low, high] = paint(view.colours, colouring, columns[choice.value]);
-    const stops = colouring.grey ? 'black, white' : viridis.map((stop) => `#${stop.getHexString()}`).join(', ');
-    scale.replaceChildren(readable(low), element('i', { style: { background: `linear-gradient(90deg, ${stops})` } }),
+    const colours = gradient(colouring.grey ? ['black', 'white'] : viridis);
+    scale.replaceChildren(readable(low), element('i', { style: { background: colours } }),
       `${readable(high)}${colouring.unit ? ` ${colouring.unit}` : ''}`);
     view.draw();
   };

@@ -1,13 +1,17 @@
 // The page: title, key figures, notes and panels, from the JSON in the element "data".
 import { cloud } from './cloud.js';
 import { element } from './dom.js';
+import { heat } from './heat.js';
+import { film, plane } from './plane.js';
 import { picture, table } from './plain.js';
-import { lines, plane } from './plots.js';
+import { lines } from './plots.js';
 import { startTheme, toggleTheme } from './theme.js';
 
 const kinds = {
-  lines: { draw: lines, empty: (panel) => panel.curves.length === 0 || panel.x_values.length === 0 },
+  lines: { draw: lines, empty: (panel) => panel.curves.length + panel.bands.length === 0 || panel.x_values.length === 0 },
   plane: { draw: plane, empty: (panel) => panel.curves.every((curve) => curve.x.length === 0) },
+  film: { draw: film, empty: (panel) => panel.frames.length === 0 },
+  heat: { draw: heat, empty: (panel) => panel.values.length === 0 },
   picture: { draw: picture, empty: (panel) => panel.png === '' },
   table: { draw: table, empty: (panel) => panel.rows.length === 0 },
   cloud: { draw: cloud, empty: (panel) => panel.points === '' && panel.curves.every((curve) => curve.points === '') },
@@ -19,10 +23,14 @@ function head(data) {
   return element('header', {}, element('div', {}, element('h1', {}, data.title), element('p', {}, data.subtitle)), button);
 }
 
+/** Verdicts are said in words as well: colours are not for everybody. */
+const verdicts = { none: null, good: 'ok', bad: 'wrong' };
+
 function figures(data) {
   const cells = data.figures.map((figure) => element('div', { className: `figure ${figure.verdict}` },
     element('dt', {}, figure.label),
-    element('dd', {}, figure.value, figure.unit ? element('small', {}, figure.unit) : null),
+    element('dd', {}, figure.value, figure.unit ? element('small', {}, figure.unit) : null,
+      verdicts[figure.verdict] ? element('b', {}, verdicts[figure.verdict]) : null),
     figure.hint ? element('span', { className: 'hint' }, figure.hint) : null));
   return element('dl', { className: 'figures' }, ...cells);
 }

@@ -1,0 +1,179 @@
+// Curves in a plane, still or along a slider. uPlot draws the axes; its own paths want a common axis, so the curves are ours.
+import uPlot from 'uplot';
+import { colour, element, onResize, readable, switchable } from './dom.js';
+import { axisOptions, horizontal } from './plots.js';
+import { onTheme } from './theme.js';
+
+/** Smallest box around all curves. */
+function boundsOf(curves) {
+  const bounds = { x: [Infinity, -Infinity], y: [Infinity, -Infinity] };
+  for (const curve of curves)
+    for (const side of ['x', 'y'])
+      for (const value of curve[side])
+        if (value !== null) bounds[side] = [Math.min(bounds[side][0], value), Math.max(bounds[side][1], value)];
+  return bounds;
+}
+
+/** Dots wander off far; the picture is framed by the lines where there are any. */
+function frameOf(curves) {
+  const drawn = curves.filter((curve) => !curve.dots && curve.x.length > 0);
+  return boundsOf(drawn.length > 0 ? drawn : curves);
+}
+
+/** The curve as a path; dots are lines of no length with round ends. */
+function trace(plot, curve) {
+  let down = false;
+  plot.ctx.beginPath();
+  curve.x.forEach((value, i) => {
+    if (value === null || curve.y[i] === null) {
+      down = false;
+      return;
+    }
+    const x = plot.valToPos(value, 'x', true);
+    const y = plot.valToPos(curve.y[i], 'y', true);
+    if (curve.dots) {
+      plot.ctx.moveTo(x, y);
+      plot.ctx.lineTo(x + 0.01, y);
+    } else if (down) plot.ctx.lineTo(x, y);
+    else plot.ctx.moveTo(x, y);
+    down = true;
+  });
+}
+
+function drawCurve(plot, curve) {
+  const { ctx } = plot;
+  const pixel = devicePixelRatio;
+  ctx.lineJoin = 'round';
+  ctx.lineCap = 'round';
+  // The truth lies below the estimate and still shows where the two agree.
+  ctx.lineWidth = (curve.dots ? 5 : curve.ink === 'truth' ? 4 : 1.8) * pixel;
+  ctx.setLineDash(curve.dashed ? [7 * pixel, 6 * pixel] : []);
+  ctx.strokeStyle = colour(curve.ink);
+  ctx.fillStyle = colour(curve.ink);
+  trace(plot, curve);
+  if (curve.filled) {
+    ctx.globalAlpha = 0.15;
+    ctx.fill();
+  }
+  ctx.globalAlpha = curve.dots ? 0.7 : 1;
+  ctx.stroke();
+}
+
+/** Draws the curves of one name that are there now. */
+function drawNamed(plot, curves) {
+  plot.ctx.save();
+  plot.ctx.beginPath();
+  plot.ctx.rect(plot.bbox.left, plot.bbox.top, plot.bbox.width, plot.bbox.height);
+  plot.ctx.clip();
+  for (const curve of curves) {
+    plot.ctx.globalAlpha = 1;
+    drawCurve(plot, curve);
+  }
+  plot.ctx.restore();
+  return null;
+}
+
+/** Shows the bounds in the room that the axes have left over, at one scale for both sides where that is asked for. */
+function fit(plot, bounds, equal) {
+  const room = { x: plot.bbox.width, y: plot.bbox.height };
+  const span = (side) => 1.08 * Math.max(bounds[side][1] - bounds[side][0], 1e-3);
+  const own = { x: span('x') / room.x, y: span('y') / room.y };
+  const common = Math.max(own.x, own.y);
+  plot.batch(() => {
+    for (const side of ['x', 'y']) {
+      const centre = (bounds[side][0] + bounds[side][1]) / 2;
+      const half = ((equal ? common : own[side]) * room[side]) / 2;
+      plot.setScale(side, { min: centre - half, max: centre + half });
+    }
+  });
+}
+
+/** A plot of all these curves with a legend; show(curves) draws those from then on, in the same frame. */
+function view(panel, all, body) {
+  const names = [...new Map(all.map((curve) => [curve.name, curve])).values()];
+  const bounds = frameOf(all);
+  const height = panel.wide ? 520 : 420;
+  let shown = all;
+  const paths = (plot, index) => drawNamed(plot, shown.filter((curve) => curve.name === names[index - 1].name));
+  const options = {
+    mode: 2,
+    width: 600,
+    height,
+    scales: { x: { time: false, auto: false, range: bounds.x }, y: { auto: false, range: bounds.y } },
+    axes: [horizontal(panel.x), axisOptions(panel.y)],
+    legend: { show: false },
+    cursor: { drag: { x: false, y: false }, points: { show: false } },
+    series: [null, ...names.map((curve) => ({ label: curve.name, stroke: () => colour(curve.ink), paths }))],
+  };
+  const place = element('div');
+  body.append(place);
+  const plot = new uPlot(options, [null, ...names.map((curve) => [curve.x, curve.y])], place);
+  onResize(place, (width) => {
+    plot.setSize({ width, height });
+    // Twice: numbers of another length leave another room.
+    fit(plot, bounds, panel.equal_scale);
+    fit(plot, bounds, panel.equal_scale);
+  });
+  onTheme(() => plot.redraw(false));
+  const shape = (curve) => ['dots', 'dashed', 'filled'].find((kind) => curve[kind]) ?? '';
+  body.append(
+    element('div', { className: 'bar' }, ...names.map((curve, i) =>
+      switchable(curve.name, curve.ink, (show) => plot.setSeries(i + 1, { show }), shape(curve)))),
+  );
+  return (curves) => {
+    shown = curves;
+    plot.redraw(false);
+  };
+}
+
+export function plane(panel, body) {
+  view(panel, panel.curves, body);
+}
+
+/** Moves the slider on by itself, a whole film in about eight seconds, while the button is pressed. */
+function playButton(slider) {
+  const button = element('button', { type: 'button' }, '▶ play');
+  let timer = 0;
+  const stop = () => {
+    clearInterval(timer);
+    timer = 0;
+    button.textContent = '▶ play';
+  };
+  const go = (to) => {
+    slider.value = to;
+    slider.dispatchEvent(new Event('input'));
+  };
+  button.addEventListener('click', () => {
+    if (timer !== 0) return stop();
+    const last = Number(slider.max);
+    if (Number(slider.value) === last) go(0);
+    button.textContent = '❚❚ pause';
+    timer = setInterval(() => {
+      if (Number(slider.value) < last) go(Number(slider.value) + 1);
+      else stop();
+    }, Math.min(Math.max(8000 / (last + 1), 40), 600));
+  });
+  slider.addEventListener('pointerdown', stop);
+  return button;
+}
+
+export function film(panel, body) {
+  const last = panel.frames.length - 1;
+  const slider = element('input', { type: 'range', min: 0, max: last, step: 1, value: last, ariaLabel: panel.slider.label });
+  const place = element('output');
+  const caption = element('p', { className: 'frame' });
+  const drawing = element('div');
+  body.append(element('div', { className: 'film' }, playButton(slider), slider, place), caption, drawing);
+
+  const show = view(panel, [...panel.still, ...panel.frames.flatMap((frame) => frame.curves)], drawing);
+  const apply = () => {
+    const frame = panel.frames[slider.value];
+    const { label, unit } = panel.slider;
+    place.textContent = `${label} ${readable(frame.at)}${unit ? ` ${unit}` : ''}`;
+    slider.setAttribute('aria-valuetext', place.textContent);
+    caption.textContent = frame.caption;
+    show([...panel.still, ...frame.curves]);
+  };
+  slider.addEventListener('input', apply);
+  apply();
+}
