@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -47,13 +48,13 @@ struct WorldStep {
 };
 
 struct LandmarkWorld {
-  std::size_t count = 24;       ///< landmarks
-  double spacing = 4;           ///< no two are nearer than this [m]
+  std::size_t count = 16;       ///< landmarks
+  double spacing = 5;           ///< no two are nearer than this [m]
   double reach = 9;             ///< the sensor sees as far [m]
   double detection = 0.9;       ///< chance that a landmark within reach is seen in a step
   double false_alarms = 0;      ///< mean number in a step, uniform over what the sensor can see
-  double range_sigma = 0.15;    ///< [m]
-  double bearing_sigma = 0.03;  ///< [rad]
+  double range_sigma = 0.2;    ///< [m]
+  double bearing_sigma = 0.02;  ///< [rad]
   double radius = 15;           ///< of the circle driven [m]
   double speed = 1.5;           ///< [m/s]
   double dt = 0.5;              ///< [s]
@@ -146,13 +147,17 @@ inline std::vector<WorldStep> LandmarkWorld::drive(const std::vector<cairn::Vect
   return log;
 }
 
-/// 2-sigma ellipse of where the robot is, turned from its own axes to the map's.
+/// 2-sigma ellipse of a place.
+[[nodiscard]] inline PlaneCurve ellipse_of(std::string name, Ink ink, const cairn::Vector<2>& mean,
+                                           const cairn::Matrix<2>& p) {
+  return ellipse(std::move(name), ink, {mean(0), mean(1)}, {p(0, 0), p(0, 1), p(1, 1)});
+}
+/// The same of where a robot is, turned from its own axes to the map's.
 [[nodiscard]] inline PlaneCurve ellipse_of(std::string name, Ink ink,
                                            const cairn::Gaussian<cairn::SE2>& pose) {
   const cairn::Matrix<2> turn = pose.mean.rotation().matrix();
   const cairn::Matrix<2> own = pose.covariance.topLeftCorner<2, 2>();
-  return ellipse(std::move(name), ink, pose.mean.translation(),
-                 cairn::Matrix<2>(turn * own * turn.transpose()));
+  return ellipse_of(std::move(name), ink, pose.mean.translation(), turn * own * turn.transpose());
 }
 
 /// Lengthens a curve by a point.
@@ -167,6 +172,35 @@ inline void extend(PlaneCurve& curve, const cairn::Vector<2>& point) {
   PlaneCurve curve{.name = std::move(name), .ink = ink, .dots = true};
   for (const cairn::Vector<2>& point : points) extend(curve, point);
   return curve;
+}
+
+/// Correlations of the numbers of a state, from its covariance.
+[[nodiscard]] inline HeatMap correlations_of(const cairn::Matrix<cairn::dynamic, cairn::dynamic>& p) {
+  HeatMap map{.title = "Correlations at the end",
+              .caption =
+                  "Of all numbers of the state: three of the pose, then two a landmark, in the order of "
+                  "meeting. Zero, the pale colour, would mean that one says nothing of the other.",
+              .x = {"number of the state"},
+              .y = {"number of the state"},
+              .value = {"correlation"},
+              .columns = static_cast<std::size_t>(p.cols()),
+              .rows = static_cast<std::size_t>(p.rows()),
+              .diverging = true};
+  for (int i = 0; i < p.rows(); ++i)
+    for (int j = 0; j < p.cols(); ++j) {
+      const double scale = std::sqrt(p(i, i) * p(j, j));
+      map.values.push_back(scale > 0 ? p(i, j) / scale : 0);
+    }
+  return map;
+}
+
+/// How many landmarks a log has met.
+[[nodiscard]] inline std::size_t landmarks_met(const std::vector<WorldStep>& log) {
+  std::set<int> met;
+  for (const WorldStep& step : log)
+    for (const LandmarkSighting& seen : step.sightings)
+      if (seen.landmark != nothing_real) met.insert(seen.landmark);
+  return met.size();
 }
 
 }  // namespace example
