@@ -53,7 +53,7 @@ struct LandmarkWorld {
   double reach = 9;             ///< the sensor sees as far [m]
   double detection = 0.9;       ///< chance that a landmark within reach is seen in a step
   double false_alarms = 0;      ///< mean number in a step, uniform over what the sensor can see
-  double range_sigma = 0.2;    ///< [m]
+  double range_sigma = 0.2;     ///< [m]
   double bearing_sigma = 0.02;  ///< [rad]
   double radius = 15;           ///< of the circle driven [m]
   double speed = 1.5;           ///< [m/s]
@@ -63,6 +63,11 @@ struct LandmarkWorld {
   [[nodiscard]] cairn::SE2 start() const { return {radius, 0.0, std::numbers::pi / 2}; }
   [[nodiscard]] std::size_t steps_of_lap() const {
     return static_cast<std::size_t>(2 * std::numbers::pi * radius / (speed * dt));
+  }
+  /// What the wheels say of the next pose.
+  [[nodiscard]] cairn::Gaussian<cairn::SE2> moved(const cairn::SE2& pose,
+                                                  const cairn::Vector<2>& control) const {
+    return {motion.propagate(pose, control, dt), motion.noise(pose, control, dt).dense()};
   }
   /// Places on both sides of the circle.
   [[nodiscard]] std::vector<cairn::Vector<2>> landmarks(cairn::Random& random) const;
@@ -103,6 +108,47 @@ struct LandmarkSensor {
     const double range = z.part<0>()(0), bearing = z.part<1>().angle();
     return pose * cairn::Vector<2>(range * std::cos(bearing), range * std::sin(bearing));
   }
+  /// How well that is known, if the pose is: G R G^T, G the derivative of initialise() by z.
+  [[nodiscard]] cairn::Matrix<2> spread(const cairn::SE2& pose, const Measurement& z) const {
+    const double range = z.part<0>()(0), bearing = z.part<1>().angle();
+    cairn::Matrix<2> g;
+    g << std::cos(bearing), -range * std::sin(bearing), std::sin(bearing), range * std::cos(bearing);
+    g = (pose.rotation().matrix() * g).eval();
+    return g * noise(State()) * g.transpose();
+  }
+};
+
+/// The sensor as a model of the pose alone: what is not known of the landmark counts as noise,
+/// R + H_landmark P H_landmark^T.
+struct SensorOfPose {
+  using State = cairn::SE2;
+  using Measurement = RangeAndBearing;
+  const LandmarkSensor& sensor;
+  const cairn::Gaussian<cairn::Vector<2>>& landmark;
+
+  [[nodiscard]] Measurement predict(const State& x) const { return seen_from(x, landmark.mean); }
+  [[nodiscard]] cairn::Matrix<2, 3> jacobian(const State& x) const { return by_both(x).leftCols<3>(); }
+  [[nodiscard]] cairn::Matrix<2> noise(const State& x) const {
+    const cairn::Matrix<2> h = by_both(x).rightCols<2>();
+    return sensor.noise(LandmarkSensor::State()) + h * landmark.covariance * h.transpose();
+  }
+  [[nodiscard]] cairn::Matrix<2, 5> by_both(const State& x) const {
+    return sensor.jacobian(LandmarkSensor::State(x, landmark.mean));
+  }
+};
+
+/// The sensor as a model of the landmark alone, the pose known exactly.
+struct SensorOfLandmark {
+  using State = cairn::Vector<2>;
+  using Measurement = RangeAndBearing;
+  const LandmarkSensor& sensor;
+  const cairn::SE2& pose;
+
+  [[nodiscard]] Measurement predict(const State& landmark) const { return seen_from(pose, landmark); }
+  [[nodiscard]] cairn::Matrix<2> jacobian(const State& landmark) const {
+    return sensor.jacobian(LandmarkSensor::State(pose, landmark)).rightCols<2>();
+  }
+  [[nodiscard]] cairn::Matrix<2> noise(const State&) const { return sensor.noise(LandmarkSensor::State()); }
 };
 
 inline std::vector<cairn::Vector<2>> LandmarkWorld::landmarks(cairn::Random& random) const {
@@ -125,10 +171,7 @@ inline std::vector<WorldStep> LandmarkWorld::drive(const std::vector<cairn::Vect
   cairn::SE2 pose = start();
   for (std::size_t k = 0; k < steps; ++k) {
     WorldStep step{cairn::Vector<2>(speed, speed / radius), pose, {}};
-    const auto variance = motion.noise(pose, step.control, dt).values;
-    cairn::Vector<3> slip;
-    for (int i = 0; i < 3; ++i) slip(i) = random.normal(0, std::sqrt(variance[static_cast<std::size_t>(i)]));
-    pose = step.truth = motion.propagate(pose, step.control, dt) * cairn::SE2::exp(slip);
+    pose = step.truth = cairn::sample(moved(pose, step.control), random);
     const auto see = [&](double range, double bearing, int which) {
       step.sightings.push_back({RangeAndBearing(cairn::Vector<1>(range), cairn::SO2(bearing)), which});
     };
@@ -171,6 +214,13 @@ inline void extend(PlaneCurve& curve, const cairn::Vector<2>& point) {
                                         const std::vector<cairn::Vector<2>>& points) {
   PlaneCurve curve{.name = std::move(name), .ink = ink, .dots = true};
   for (const cairn::Vector<2>& point : points) extend(curve, point);
+  return curve;
+}
+
+/// The path that was really driven.
+[[nodiscard]] inline PlaneCurve true_path(const std::vector<WorldStep>& log) {
+  PlaneCurve curve{.name = "true path", .ink = Ink::truth};
+  for (const WorldStep& step : log) extend(curve, step.truth.translation());
   return curve;
 }
 
