@@ -57,7 +57,7 @@ bool can_open() {
 std::vector<std::string> lessons() {
   std::istringstream list(CAIRN_LESSONS);
   std::vector<std::string> names;
-  for (std::string name; std::getline(list, name, ';');) names.push_back(name);
+  for (std::string name; std::getline(list, name, ',');) names.push_back(name);
   return names;
 }
 
