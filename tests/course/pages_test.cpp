@@ -4,6 +4,7 @@
 // Opens the page of every lesson, and of one with each kind of panel, in headless Chromium.
 #include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <sstream>
 #include <string>
 #include <vector>
