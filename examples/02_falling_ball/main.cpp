@@ -143,7 +143,7 @@ int main(int argc, char** argv) {
   lesson.csv("sweep", {"q_factor", "nis", "nees", "rms_m", "expected_nis"}, sweep);
   return lesson.finish();
 }
-// ANSWERS  1. Near q = 0.07 of the true one, with a NEES of 23 there: one NIS cannot set both R and q. Look
+// ANSWERS  1. Near q = 0.07 of the true one, with a NEES of 22 there: one NIS cannot set both R and q. Look
 // at whether surprises follow one another, too: they are independent where both are right.
 // 2. 1 +- 0.28, and no: 2 q gives 0.93. 3. Top left 32 times (dt^5), bottom right twice, between 16, 8 and 4
 // times.

@@ -69,9 +69,9 @@ int main(int argc, char** argv) {
        .sentence = "States live on manifolds: a heading is no plain number, and a filter has to know.",
        .steps = 200,
        .least_steps = 50,
-       .mistakes = {{"transposed", "P <- G' P G; PythonRobotics' EKF-SLAM"},
+       .mistakes = {{"transposed", "P <- G' P G; PythonRobotics' EKF-SLAM, as of PR #258"},
                     {"exchanged", "sine and cosine exchanged in G; SLAM-Course-Solutions #5"},
-                    {"plain-bearings", "z - h the long way round; PX4 until PR #21287"}}},
+                    {"plain-bearings", "z - h the long way round; PX4's GNSS heading until PR #21287"}}},
       argc, argv);
   const cairn::Unicycle world{.speed_density = 0.005, .slip_density = 1e-4, .turn_density = 0.001};
   const Robot robot{world, lesson.mistake("transposed"), lesson.mistake("exchanged")};

@@ -77,7 +77,7 @@ int main(int argc, char** argv) {
        .steps = 200,
        .least_steps = 50,
        .mistakes = {{"off-by-one", "F and Q of the step before; filterpy #37, until 0.1.3"},
-                    {"wrong-sign", "Ps = P - G (Ps - P-), without G'; PyNumDiff until PR #98"}}},
+                    {"wrong-sign", "Ps = P - G (Ps - P-), without G'; found in PyNumDiff PR #98"}}},
       argc, argv);
   cairn::Random random(lesson.seed());
   cairn::RunningMoments filter_nees, smoother_nees;

@@ -4,7 +4,10 @@
 // What the lessons share: as a library, and as a program that its user meets.
 #include "support/lesson.hpp"
 
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <string>
@@ -135,6 +138,29 @@ TEST_CASE("ellipse: without variance it is a point or a line, and what is no cov
     CHECK(message_of([&] {
             static_cast<void>(example::ellipse("e", example::Ink::belief, {0, 0}, covariance));
           }).find("ellipse \"e\": expected a covariance") == 0);
+}
+
+TEST_CASE("area: runs along the upper edge and back along the lower one") {
+  const auto curve = example::area("a", example::Ink::belief, {0, 1}, {-1, -2}, {1, 2});
+  CHECK(curve.x == std::vector<double>{0, 1, 1, 0});
+  CHECK(curve.y == std::vector<double>{1, 2, -2, -1});
+  CHECK(curve.filled);
+  CHECK(message_of([] {
+          static_cast<void>(example::area("a", example::Ink::belief, {0}, {}, {1}));
+        }).find("expected 1 values of \"a\", found 0") != std::string::npos);
+}
+
+TEST_CASE("report: a film starts at the frame that was asked for, or at its last one") {
+  example::Report report("title", "");
+  example::PlaneFilm film{.title = "film", .frames = {{0, "", {}}, {1, "", {}}, {2, "", {}}}};
+  report.add(film);
+  CHECK(report.data().find("\"start\":2") != std::string::npos);
+  film.start = 1;
+  report.add(film);
+  CHECK(report.data().find("\"start\":1") != std::string::npos);
+  film.start = 3;
+  CHECK(message_of([&] { report.add(film); }) ==
+        "report panel \"film\": expected to start at a frame up to 2, found 3");
 }
 
 TEST_CASE("report: a heat map and a film that do not fit together are refused by name") {

@@ -4,6 +4,7 @@
 // Opens the page of every lesson, and of one with each kind of panel, in headless Chromium.
 #include <cstddef>
 #include <filesystem>
+#include <limits>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -57,7 +58,7 @@ bool can_open() {
 std::vector<std::string> lessons() {
   std::istringstream list(CAIRN_LESSONS);
   std::vector<std::string> names;
-  for (std::string name; std::getline(list, name, ';');) names.push_back(name);
+  for (std::string name; std::getline(list, name, ',');) names.push_back(name);
   return names;
 }
 
