@@ -60,7 +60,7 @@ std::vector<FoundLandmark> landmarks_of(const Map& map) {
 /// Every so-manieth place of a particle's path, from the newest back.
 std::vector<Vector<2>> thinned_path(const Belief& belief, std::size_t particle) {
   const auto path = belief.path(particle);
-  const std::size_t every = path.size() / 300 + 1;
+  const std::size_t every = path.size() / 150 + 1;
   std::vector<Vector<2>> places;
   for (std::size_t back = 0; back < path.size(); back += every)
     places.push_back(path[path.size() - 1 - back].pose.translation());
@@ -181,7 +181,7 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
   const cairn::ConditionalFilter filter{
       .resample_below = options.resample_below, .seed = options.seed, .threads = options.threads};
   std::vector<SE2> odometry;
-  const std::size_t every = std::max<std::size_t>(1, log.frames.size() / 60);
+  const std::size_t every = std::max<std::size_t>(1, log.frames.size() / 40);
   for (const Frame& frame : log.frames) {
     const cairn::MappingStep did = step(filter, belief, frame, log.motion_factor, options.proposal);
     if (!did.accepted())
