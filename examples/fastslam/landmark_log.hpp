@@ -40,6 +40,9 @@ struct Between {
 struct LandmarkLog {
   std::string name{};
   PointSensor sensor{};
+  /// Variances that the particle filter takes, over the log's own: a few particles need a wider motion than
+  /// is true, or none of them meets the old map where a loop closes.
+  double motion_factor = 1, sighting_factor = 1;
   std::vector<Frame> frames{};
   std::vector<Between> between{};
   std::vector<cairn::StampedPose2> truth{};               ///< by growing times; none where it is not known

@@ -20,9 +20,9 @@ using cairn::StampedPose2;
 using cairn::Vector;
 
 cairn::MappingStep step(const cairn::ConditionalFilter& filter, Belief& belief, const Frame& frame,
-                        ProposalKind kind) {
+                        double factor, ProposalKind kind) {
   const auto motion = [&](const SE2& x, std::size_t) {
-    return cairn::Gaussian<SE2>{x * frame.moved.mean, frame.moved.covariance};
+    return cairn::Gaussian<SE2>{x * frame.moved.mean, factor * frame.moved.covariance};
   };
   return kind == ProposalKind::motion ? filter.step(belief, motion, cairn::FromMotion{}, frame.seen)
                                       : filter.step(belief, motion, cairn::FromLandmarks{}, frame.seen);
@@ -60,7 +60,7 @@ std::vector<FoundLandmark> landmarks_of(const Map& map) {
 /// Every so-manieth place of a particle's path, from the newest back.
 std::vector<Vector<2>> thinned_path(const Belief& belief, std::size_t particle) {
   const auto path = belief.path(particle);
-  const std::size_t every = path.size() / 300 + 1;
+  const std::size_t every = path.size() / 150 + 1;
   std::vector<Vector<2>> places;
   for (std::size_t back = 0; back < path.size(); back += every)
     places.push_back(path[path.size() - 1 - back].pose.translation());
@@ -177,13 +177,13 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
   for (const auto& [id, place] : log.landmarks) r.true_landmarks.push_back(place);
   const auto begin = std::chrono::steady_clock::now();
   const std::clock_t cpu = std::clock();
-  Belief belief(SE2(), Map(log.sensor, options.landmarks), options.particles);
+  Belief belief(SE2(), Map(log.sensor.scaled(log.sighting_factor), options.landmarks), options.particles);
   const cairn::ConditionalFilter filter{
       .resample_below = options.resample_below, .seed = options.seed, .threads = options.threads};
   std::vector<SE2> odometry;
-  const std::size_t every = std::max<std::size_t>(1, log.frames.size() / 60);
+  const std::size_t every = std::max<std::size_t>(1, log.frames.size() / 40);
   for (const Frame& frame : log.frames) {
-    const cairn::MappingStep did = step(filter, belief, frame, options.proposal);
+    const cairn::MappingStep did = step(filter, belief, frame, log.motion_factor, options.proposal);
     if (!did.accepted())
       cairn::raise("frame " + std::to_string(odometry.size()) + ": " + explain(did.status));
     odometry.push_back(odometry.empty() ? frame.moved.mean : odometry.back() * frame.moved.mean);
