@@ -76,6 +76,7 @@
 #include <cairn/geometry/stereo_pose_options.hpp>
 #include <cairn/geometry/stereo_rig.hpp>
 #include <cairn/geometry/triangulation.hpp>
+#include <cairn/grid/ancestry.hpp>
 #include <cairn/grid/distance_field.hpp>
 #include <cairn/grid/height_cell.hpp>
 #include <cairn/grid/ray.hpp>
