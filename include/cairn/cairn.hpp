@@ -127,6 +127,7 @@
 #include <cairn/scan/match.hpp>
 #include <cairn/scan/occupancy_grid.hpp>
 #include <cairn/scan/scan.hpp>
+#include <cairn/scan/stop_grid.hpp>
 #include <cairn/simd/matrix_product.hpp>
 #include <cairn/simd/registers.hpp>
 #include <cairn/simd/shuffle.hpp>

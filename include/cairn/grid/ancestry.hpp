@@ -21,13 +21,12 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <utility>
 #include <vector>
 
-#include <cairn/core/check.hpp>
+#include <cairn/grid/shared_tiles.hpp>
 #include <cairn/grid/tile.hpp>
 #include <cairn/version.hpp>
 
@@ -66,16 +65,16 @@ public:
   /// rows.
   template <class Visit>
   void for_each_tile(Visit&& visit) const {
-    for (const auto& [address, cells] : tree_->tiles()) {
+    tree_->cells().for_each_tile([&](TileAddress address, const auto& cells) {
       Tile tile{};
       bool any = false;
       for (std::size_t i = 0; i < tile.size(); ++i)
-        if (const Cell* found = tree_->find(node_, (*cells)[i])) {
+        if (const Cell* found = tree_->find(node_, cells[i])) {
           tile[i] = *found;
           any = true;
         }
       if (any) visit(address, static_cast<const Tile&>(tile));
-    }
+    });
   }
 
   /// Held while one thread changes a grid of the tree and others may change another.
@@ -104,8 +103,6 @@ private:
 
   class Tree {
   public:
-    using Tiles = std::map<TileAddress, std::unique_ptr<std::array<Entries, tile_cells>>>;
-
     [[nodiscard]] NodeNumber root() { return add(none); }
     void hold(NodeNumber node) noexcept { ++nodes_[node].holders; }
     void release(NodeNumber node) {
@@ -123,8 +120,7 @@ private:
     }
 
     [[nodiscard]] const Cell* find(NodeNumber node, CellAddress cell) const {
-      const auto tile = tiles_.find(tile_of(cell));
-      return tile == tiles_.end() ? nullptr : find(node, (*tile->second)[place_in_tile(cell)]);
+      return find(node, cells_.read(cell));
     }
     [[nodiscard]] const Cell* find(NodeNumber node, const Entries& entries) const {
       if (entries.empty()) return nullptr;
@@ -145,7 +141,7 @@ private:
       return entries.back().value;
     }
 
-    [[nodiscard]] const Tiles& tiles() const noexcept { return tiles_; }
+    [[nodiscard]] const SharedTiles<Entries>& cells() const noexcept { return cells_; }
     [[nodiscard]] std::size_t nodes() const noexcept { return nodes_.size() - free_.size(); }
     [[nodiscard]] std::size_t entries() const noexcept {
       std::size_t sum = 0;
@@ -155,10 +151,10 @@ private:
     [[nodiscard]] std::size_t bytes() const noexcept {
       std::size_t sum = nodes_.capacity() * sizeof(Node) + written_.capacity() * sizeof(written_[0]);
       for (const auto& cells : written_) sum += cells.capacity() * sizeof(CellAddress);
-      for (const auto& [address, cells] : tiles_) {
-        sum += sizeof *cells;
-        for (const Entries& entries : *cells) sum += entries.capacity() * sizeof(Entry);
-      }
+      cells_.for_each_tile([&](TileAddress, const auto& tile) {
+        sum += sizeof tile;
+        for (const Entries& entries : tile) sum += entries.capacity() * sizeof(Entry);
+      });
       return sum;
     }
 
@@ -168,13 +164,15 @@ private:
       for (const NodeNumber node : free_) dead[node] = true;
       for (std::size_t n = 0; n < nodes_.size(); ++n)
         if (!dead[n] && nodes_[n].parent != none) ++children[nodes_[n].parent];
-      for (const auto& [address, cells] : tiles_)
-        for (const Entries& each : *cells)
+      bool once = true;
+      cells_.for_each_tile([&](TileAddress, const auto& tile) {
+        for (const Entries& each : tile)
           for (std::size_t i = 0; i < each.size(); ++i) {
             ++entries[each[i].name];
-            for (std::size_t k = 0; k < i; ++k)
-              if (each[k].name == each[i].name) return false;
+            for (std::size_t k = 0; k < i; ++k) once = once && each[k].name != each[i].name;
           }
+      });
+      if (!once) return false;
       for (std::size_t n = 0; n < nodes_.size(); ++n) {
         const Node& node = nodes_[n];
         const std::size_t own = entries[node.name];
@@ -216,11 +214,7 @@ private:
       free_.push_back(node);
     }
 
-    [[nodiscard]] Entries& entries_of(CellAddress cell) {
-      auto& tile = tiles_[tile_of(cell)];
-      if (!tile) tile = std::make_unique<std::array<Entries, tile_cells>>();
-      return (*tile)[place_in_tile(cell)];
-    }
+    [[nodiscard]] Entries& entries_of(CellAddress cell) { return cells_.write(cell); }
     [[nodiscard]] static Entry* entry_of(Entries& entries, std::uint32_t name) noexcept {
       for (Entry& entry : entries)
         if (entry.name == name) return &entry;
@@ -272,7 +266,7 @@ private:
     std::vector<Node> nodes_;
     std::vector<NodeNumber> free_;
     std::vector<std::vector<CellAddress>> written_;  // by name: the cells with an entry of it
-    Tiles tiles_;
+    SharedTiles<Entries> cells_;                     // shared with nobody
   };
 
   static inline const Cell empty_{};
