@@ -78,6 +78,7 @@
 #include <cairn/geometry/stereo_pose_options.hpp>
 #include <cairn/geometry/stereo_rig.hpp>
 #include <cairn/geometry/triangulation.hpp>
+#include <cairn/grid/ancestry.hpp>
 #include <cairn/grid/distance_field.hpp>
 #include <cairn/grid/height_cell.hpp>
 #include <cairn/grid/ray.hpp>
@@ -131,6 +132,7 @@
 #include <cairn/scan/match.hpp>
 #include <cairn/scan/occupancy_grid.hpp>
 #include <cairn/scan/scan.hpp>
+#include <cairn/scan/stop_grid.hpp>
 #include <cairn/simd/matrix_product.hpp>
 #include <cairn/simd/registers.hpp>
 #include <cairn/simd/shuffle.hpp>
