@@ -11,8 +11,10 @@
 /// The noise is that which the filters are told of, so that a filter without a mistake has no excuse.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numbers>
 #include <set>
 #include <string>
@@ -247,6 +249,13 @@ inline void extend(PlaneCurve& curve, const cairn::Vector<2>& point) {
 
 [[nodiscard]] inline double distance(const cairn::Vector<2>& a, const cairn::Vector<2>& b) {
   return std::hypot(a(0) - b(0), a(1) - b(1));
+}
+
+/// To the nearest of some places.
+[[nodiscard]] inline double distance(const cairn::Vector<2>& a, const std::vector<cairn::Vector<2>>& places) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const cairn::Vector<2>& b : places) least = std::min(least, distance(a, b));
+  return least;
 }
 
 /// Places that may be landmarks: on probation (cairn::LandmarkLedger) until they have been seen in enough
