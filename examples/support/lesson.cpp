@@ -64,7 +64,7 @@ CLI::Validator one_of(const std::vector<std::string>& names) {
           listed};
 }
 
-std::string as_csv(const std::vector<std::string>& columns, const std::vector<std::vector<double>>& rows) {
+std::string as_csv(const std::vector<std::string>& columns, const Rows& rows) {
   std::string text;
   for (const std::string& column : columns) text += (text.empty() ? "" : ",") + column;
   text += '\n';
@@ -79,6 +79,12 @@ std::string as_csv(const std::vector<std::string>& columns, const std::vector<st
 }
 
 }  // namespace
+
+std::vector<double> column(const Rows& rows, std::size_t index) {
+  std::vector<double> values;
+  for (const std::vector<double>& row : rows) values.push_back(row.at(index));
+  return values;
+}
 
 Lesson::Lesson(LessonInfo info, int argc, char** argv)
     : info_(std::move(info)),
@@ -131,8 +137,7 @@ void Lesson::verdict(const std::string& name, double value, double low, double h
   if (!right) wrong_.push_back(name);
 }
 
-void Lesson::csv(const std::string& name, const std::vector<std::string>& columns,
-                 const std::vector<std::vector<double>>& rows) {
+void Lesson::csv(const std::string& name, const std::vector<std::string>& columns, const Rows& rows) {
   for (const std::vector<double>& row : rows)
     if (row.size() != columns.size())
       cairn::raise("table \"" + name + "\": expected " + std::to_string(columns.size()) +

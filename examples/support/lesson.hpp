@@ -26,6 +26,8 @@
 #include <utility>
 #include <vector>
 
+#include <cairn/core/statistics.hpp>
+
 #include "support/report.hpp"
 
 namespace example {
@@ -45,6 +47,10 @@ struct LessonInfo {
   std::size_t most_steps = 100000;
   std::vector<Mistake> mistakes = {};
 };
+
+/// A table that is kept row by row, and one of its columns.
+using Rows = std::vector<std::vector<double>>;
+[[nodiscard]] std::vector<double> column(const Rows& rows, std::size_t index);
 
 class Lesson {
 public:
@@ -66,6 +72,11 @@ public:
   /// a key figure of the page.
   void verdict(const std::string& name, double value, double low, double high, const std::string& hint = {});
 
+  void verdict(const std::string& name, double value, const cairn::ConsistencyBand& band,
+               const std::string& hint = {}) {
+    verdict(name, value, band.low, band.high, hint);
+  }
+
   /// A number of the page without a verdict.
   void figure(KeyFigure figure) { report_.figure(std::move(figure)); }
 
@@ -77,8 +88,7 @@ public:
 
   /// The file NAME.csv among the results. Throws cairn::Error where a row has another number of values than
   /// there are columns.
-  void csv(const std::string& name, const std::vector<std::string>& columns,
-           const std::vector<std::vector<double>>& rows);
+  void csv(const std::string& name, const std::vector<std::string>& columns, const Rows& rows);
 
   /// Writes page and tables, prints "verdict: green" or "verdict: RED (names)", and returns the exit code. A
   /// lesson without a verdict is red.

@@ -192,6 +192,7 @@ void Report::add(const LinePlot& panel) {
     json["curves"].push_back({{"name", curve.name},
                               {"ink", name_of(curve.ink)},
                               {"dashed", curve.dashed},
+                              {"dots", curve.dots},
                               {"values", rounded_all(curve.values)}});
   }
   json["bands"] = Json::array();
@@ -214,7 +215,12 @@ void Report::add(const PlanePlot& panel) {
 
 void Report::add(const PlaneFilm& panel) {
   Json json = plane_head("film", panel);
+  const std::size_t last = panel.frames.empty() ? 0 : panel.frames.size() - 1;
+  if (panel.start.value_or(0) > last)
+    cairn::raise("report panel \"" + panel.title + "\": expected to start at a frame up to " +
+                 std::to_string(last) + ", found " + std::to_string(*panel.start));
   json["slider"] = axis(panel.slider);
+  json["start"] = panel.start.value_or(last);
   json["still"] = curves_of(panel.title, panel.still);
   json["frames"] = Json::array();
   for (const PlaneFrame& frame : panel.frames)
@@ -320,7 +326,7 @@ PlaneCurve ellipse(std::string name, Ink ink, const std::array<double, 2>& mean,
   const double across = xx > 0 ? xy / along : 0;
   const double upwards = std::sqrt(std::max(left_over, 0.0));
   constexpr int corners = 48;
-  PlaneCurve curve{.name = std::move(name), .ink = ink};
+  PlaneCurve curve{.name = std::move(name), .ink = ink, .filled = true};
   for (int corner = 0; corner <= corners; ++corner) {
     const double angle = 2 * std::numbers::pi * corner / corners;
     const double u = sigmas * std::cos(angle);
@@ -328,6 +334,16 @@ PlaneCurve ellipse(std::string name, Ink ink, const std::array<double, 2>& mean,
     curve.x.push_back(mean[0] + along * u);
     curve.y.push_back(mean[1] + across * u + upwards * v);
   }
+  return curve;
+}
+
+PlaneCurve area(std::string name, Ink ink, const std::vector<double>& x, const std::vector<double>& low,
+                const std::vector<double>& high) {
+  expect_as_many(low.size(), x.size(), "area", name);
+  expect_as_many(high.size(), x.size(), "area", name);
+  PlaneCurve curve{.name = std::move(name), .ink = ink, .x = x, .y = high, .filled = true};
+  curve.x.insert(curve.x.end(), x.rbegin(), x.rend());
+  curve.y.insert(curve.y.end(), low.rbegin(), low.rend());
   return curve;
 }
 

@@ -49,6 +49,7 @@ struct Curve {
   Ink ink = Ink::belief;
   std::vector<double> values = {};  ///< one for each x value
   bool dashed = false;
+  bool dots = false;  ///< single ones, such as readings, without a line between them
 };
 
 /// The room between two curves over the common x values of a LinePlot, such as a mean and two standard
@@ -91,6 +92,10 @@ struct PlaneCurve {
 [[nodiscard]] PlaneCurve ellipse(std::string name, Ink ink, const std::array<double, 2>& mean,
                                  const std::array<double, 3>& covariance, double sigmas = 2);
 
+/// What lies between `low` and `high` over x, as an area. Throws cairn::Error where they are not as many.
+[[nodiscard]] PlaneCurve area(std::string name, Ink ink, const std::vector<double>& x,
+                              const std::vector<double>& low, const std::vector<double>& high);
+
 /// Curves in a plane: a map, where its two axes have the same scale.
 struct PlanePlot {
   std::string title = {};
@@ -110,7 +115,7 @@ struct PlaneFrame {
 };
 
 /// Curves in a plane that change along a slider, in one frame for all: moved with the mouse or the arrow
-/// keys, or played. It begins at the last frame.
+/// keys, or played.
 struct PlaneFilm {
   std::string title = {};
   std::string caption = {};
@@ -121,6 +126,7 @@ struct PlaneFilm {
   std::vector<PlaneFrame> frames = {};
   bool equal_scale = true;
   bool wide = false;
+  std::optional<std::size_t> start = {};  ///< the frame shown first; by default the last
 };
 
 /// A table of numbers as colours. Values that are not finite are grey.

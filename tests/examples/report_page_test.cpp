@@ -1,92 +1,41 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 //
-// Opens reports in headless Chromium. CAIRN_SCREENSHOTS names a folder for pictures of them.
-#include <cstdlib>
-#include <filesystem>
-#include <sstream>
+// Opens reports in headless Chromium.
+#include <cstddef>
 #include <string>
 
 #include <doctest/doctest.h>
 
-#include <cairn/io/file.hpp>
-
 #include "examples/synthetic_run.hpp"
 #include "outputs.hpp"
+#include "support/browser.hpp"
 #include "support/folder.hpp"
 #include "support/report.hpp"
 
 namespace report_page_test {
 namespace {
 
-struct Opened {
-  std::string document;  ///< after the scripts have run
-  std::string console;   ///< what they said
-};
-
-bool has_chromium() {
-  return std::system("command -v chromium >/dev/null 2>&1") == 0;
-}
-
-int chromium(const cairn_test::Folder& folder, const std::string& more) {
-  const std::string command =
-      "timeout 120 chromium --headless --no-sandbox --disable-gpu-sandbox --use-angle=swiftshader "
-      "--enable-unsafe-swiftshader --disable-dev-shm-usage --no-first-run --enable-logging=stderr "
-      "--virtual-time-budget=8000 --user-data-dir='" +
-      (folder / "profile").string() + "' " + more;
-  return std::system(command.c_str());
-}
-
-/// The document that Chromium makes of the file, and what it said meanwhile.
-Opened open_page(const cairn_test::Folder& folder, const std::filesystem::path& page) {
-  const int status =
-      chromium(folder, "--dump-dom 'file://" + page.string() + "' >'" + (folder / "dom").string() + "' 2>'" +
-                           (folder / "log").string() + "'");
-  REQUIRE(status == 0);
-  Opened opened{cairn::read_file(folder / "dom"), {}};
-  std::istringstream log(cairn::read_file(folder / "log"));
-  for (std::string line; std::getline(log, line);)
-    if (line.find("CONSOLE") != std::string::npos) opened.console += line + "\n";
-  return opened;
-}
-
-void keep_picture(const cairn_test::Folder& folder, const std::filesystem::path& page,
-                  const std::string& name) {
-  const char* pictures = std::getenv("CAIRN_SCREENSHOTS");
-  if (pictures == nullptr) return;
-  for (const char* theme : {"light", "dark"}) {
-    const std::string target = std::string(pictures) + "/" + name + "-" + theme + ".png";
-    CHECK(chromium(folder, "--hide-scrollbars --window-size=1280,3400 --screenshot='" + target +
-                               "' 'file://" + page.string() + "?theme=" + theme + "' 2>/dev/null") == 0);
-  }
-}
-
 bool can_open() {
   if (!example::has_report_page())
     MESSAGE("skipped: built without the page (npm)");
-  else if (!has_chromium())
+  else if (!cairn_test::has_chromium())
     MESSAGE("skipped: no chromium");
   else
     return true;
   return false;
 }
 
-std::size_t count(const std::string& text, const std::string& part) {
-  std::size_t found = 0;
-  for (std::size_t at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++found;
-  return found;
-}
-
 void check_opens(const stereo_slam::RunRecord& run, const std::string& name, std::size_t plots,
                  std::size_t clouds) {
   const cairn_test::Folder folder;
   REQUIRE_FALSE(stereo_slam::write_outputs(run, folder.path()));
-  const Opened opened = open_page(folder, folder / "report.html");
+  const cairn_test::OpenedPage opened = cairn_test::open_page(folder, folder / "report.html");
   CHECK(opened.console == "");
-  CHECK(opened.document.find("data-panels=\"8\"") != std::string::npos);
-  CHECK(count(opened.document, "class=\"uplot") == plots);
-  CHECK(count(opened.document, "class=\"cloud\"") == clouds);
-  keep_picture(folder, folder / "report.html", name);
+  CHECK(opened.has("data-panels=\"8\""));
+  CHECK(opened.count("class=\"uplot") == plots);
+  CHECK(opened.count("class=\"cloud\"") == clouds);
+  CHECK(cairn_test::keep_picture(folder, folder / "report.html", name));
 }
 
 }  // namespace

@@ -20,8 +20,9 @@ Outcome run(const std::string& command, const std::string& standard_output = "")
   return cairn_test::run_program("CAIRN_SKIP_INSTALL=1 \"" CAIRN_SCRIPTS "\"/" + command, standard_output);
 }
 
-const std::vector<std::string> scripts{"benchmark",    "check_headers", "check_layers", "check_tidy",
-                                       "include_cost", "install",       "scoreboard",   "test"};
+const std::vector<std::string> scripts{"benchmark",  "check_headers", "check_layers",
+                                       "check_tidy", "course",        "include_cost",
+                                       "install",    "scoreboard",    "test"};
 
 }  // namespace
 
@@ -48,7 +49,8 @@ TEST_SUITE("scripts") {
          {"check_headers nonsense", "install", "install nonsense", "install test nonsense", "scoreboard",
           "scoreboard nonsense", "scoreboard main_job nonsense", "scoreboard index low nonsense",
           "scoreboard index --preset nonsense", "benchmark --only", "benchmark --preset nonsense",
-          "include_cost nonsense", "include_cost cairn/nonsense.hpp"})
+          "include_cost nonsense", "include_cost cairn/nonsense.hpp", "course nonsense", "course 01 nonsense",
+          "course 01 --seed nonsense", "course 01 --steps=nonsense", "course --seed"})
       mistakes.emplace_back(mistake);
     for (const std::string& mistake : mistakes) {
       CAPTURE(mistake);

@@ -159,7 +159,7 @@ function playButton(slider) {
 
 export function film(panel, body) {
   const last = panel.frames.length - 1;
-  const slider = element('input', { type: 'range', min: 0, max: last, step: 1, value: last, ariaLabel: panel.slider.label });
+  const slider = element('input', { type: 'range', min: 0, max: last, step: 1, value: panel.start, ariaLabel: panel.slider.label });
   const place = element('output');
   const caption = element('p', { className: 'frame' });
   const drawing = element('div');

@@ -68,6 +68,12 @@ function seriesOf(panel) {
   return [...edges, ...panel.curves];
 }
 
+/** The border of a curve's sign in the legend. */
+function dashOf(curve) {
+  if (curve?.dots) return 'dotted';
+  return curve?.dashed ? 'dashed' : 'solid';
+}
+
 export function lines(panel, body) {
   const series = seriesOf(panel);
   const values = series.map((curve) => (panel.logarithmic ? positive(curve.values) : curve.values));
@@ -80,7 +86,7 @@ export function lines(panel, body) {
     },
     axes: [panel.logarithmic_x ? logarithmic(panel.x) : horizontal(panel.x), axisOptions(panel.y)],
     cursor: { sync: { key: pairing.key, setSeries: false }, focus: { prox: 30 }, points: { size: 6 } },
-    legend: { markers: { dash: (_, index) => (series[index - 1]?.dashed ? 'dashed' : 'solid') } },
+    legend: { markers: { dash: (_, index) => (dashOf(series[index - 1])) } },
     bands: panel.bands.map((band, i) => ({ series: [2 * i + 1, 2 * i + 2], fill: () => tint(band.ink, 16) })),
     series: [
       { label: labelled(panel.x), value: (_, value) => readable(value) },
@@ -89,7 +95,10 @@ export function lines(panel, body) {
         stroke: () => (curve.edge ? tint(curve.ink, 45) : colour(curve.ink)),
         width: curve.edge ? 1 : 1.6,
         dash: curve.dashed ? [6, 5] : undefined,
-        points: { show: panel.x_values.length === 1 },
+        paths: curve.dots ? () => null : undefined,
+        points: curve.dots
+          ? { show: true, size: panel.x_values.length > 150 ? 4 : 7, fill: () => colour(curve.ink), width: 0 }
+          : { show: panel.x_values.length === 1 },
         value: (_, value) => readable(value),
       })),
     ],

@@ -1,0 +1,126 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+// Opens the page of every lesson, and of one with each kind of panel, in headless Chromium.
+#include <cstddef>
+#include <filesystem>
+#include <limits>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include <doctest/doctest.h>
+
+#include <cairn/io/file.hpp>
+
+#include "support/browser.hpp"
+#include "support/folder.hpp"
+#include "support/program.hpp"
+#include "support/report.hpp"
+
+namespace pages_test {
+namespace {
+
+namespace fs = std::filesystem;
+using cairn_test::OpenedPage;
+using example::Ink;
+
+/// Moves every slider from its first to its last place, and counts those whose picture and words changed.
+constexpr const char* mover = R"(<script>
+setTimeout(async () => {
+  let moved = 0;
+  const sliders = [...document.querySelectorAll('input[type=range]')];
+  for (const slider of sliders) {
+    const panel = slider.closest('.panel');
+    const seen = [];
+    for (const place of [slider.min, slider.max]) {
+      slider.value = place;
+      slider.dispatchEvent(new Event('input'));
+      await new Promise((done) => setTimeout(done, 50));
+      seen.push([panel.querySelector('canvas').toDataURL(), panel.querySelector('output').textContent]);
+    }
+    if (seen[0][0] !== seen[1][0] && seen[0][1] !== seen[1][1]) ++moved;
+  }
+  document.documentElement.dataset.sliders = `${moved} of ${sliders.length} moved`;
+}, 500);
+</script>)";
+
+bool can_open() {
+  if (!example::has_report_page())
+    MESSAGE("skipped: built without the page (npm)");
+  else if (!cairn_test::has_chromium())
+    MESSAGE("skipped: no chromium");
+  else
+    return true;
+  return false;
+}
+
+std::vector<std::string> lessons() {
+  std::istringstream list(CAIRN_LESSONS);
+  std::vector<std::string> names;
+  for (std::string name; std::getline(list, name, ',');) names.push_back(name);
+  return names;
+}
+
+void check_sliders_move(const OpenedPage& opened) {
+  const std::string sliders = std::to_string(opened.count("type=\"range\""));
+  CHECK(opened.has("data-sliders=\"" + sliders + " of " + sliders + " moved\""));
+}
+
+void check_opens(const std::string& lesson) {
+  CAPTURE(lesson);
+  const cairn_test::Folder folder;
+  const std::string program = std::string(CAIRN_LESSON_FOLDER) + "/" + lesson;
+  const auto outcome = cairn_test::run_program("'" + program + "' --out '" + (folder / "out").string() + "'");
+  CAPTURE(outcome.words);
+  REQUIRE(outcome.code == 0);
+  const fs::path page = folder / "out" / "index.html";
+  REQUIRE(cairn_test::keep_picture(folder, page, lesson, 2000));
+  cairn::write_file_atomically(page, cairn::read_file(page) + mover);
+  const OpenedPage opened = cairn_test::open_page(folder, page);
+  CHECK(opened.console == "");
+  CHECK(opened.has("data-panels="));
+  CHECK(opened.has("class=\"figure good\""));
+  CHECK_FALSE(opened.has("class=\"empty\""));
+  check_sliders_move(opened);
+}
+
+}  // namespace
+
+TEST_SUITE_BEGIN("course/pages");
+
+TEST_CASE("course: the page of every lesson opens without a word on the console, and its sliders move") {
+  if (!can_open()) return;
+  for (const std::string& lesson : lessons()) check_opens(lesson);
+}
+
+TEST_CASE("report page: films, heat maps, bands, dots and areas are drawn, gaps and all") {
+  if (!can_open()) return;
+  const double gap = std::numeric_limits<double>::quiet_NaN();
+  example::Report report("panels", "");
+  report.add(example::LinePlot{.title = "lines",
+                               .x_values = {0, 1, 2},
+                               .curves = {{"dots", Ink::measurement, {1, gap, 2}, false, true}},
+                               .bands = {{"band", Ink::belief, {0, gap, 1}, {2, gap, 3}}}});
+  report.add(example::HeatMap{
+      .title = "heat", .columns = 2, .rows = 2, .values = {1, -1, gap, 0.5}, .diverging = true});
+  report.add(example::HeatMap{.title = "flat", .columns = 1, .rows = 1, .values = {3}});
+  example::PlaneFilm film{.title = "film", .slider = {"step"}, .equal_scale = false};
+  film.still = {{.name = "way", .ink = Ink::truth, .x = {0, gap, 9}, .y = {0, 1, 1}, .dashed = true}};
+  for (const double at : {0.0, 1.0})
+    film.frames.push_back({at, "frame", {example::ellipse("area", Ink::belief, {at, 0}, {1, 0.5, 1})}});
+  film.frames.push_back({2, "nothing here", {}});
+  report.add(film);
+  const cairn_test::Folder folder;
+  cairn::write_file_atomically(folder / "page.html", report.html().value() + mover);
+  const OpenedPage opened = cairn_test::open_page(folder, folder / "page.html");
+  CHECK(opened.console == "");
+  CHECK(opened.has("data-panels=\"4\""));
+  CHECK(opened.count("class=\"heat\"") == 2);
+  CHECK(opened.count("type=\"range\"") == 1);
+  check_sliders_move(opened);
+}
+
+TEST_SUITE_END();
+
+}  // namespace pages_test
