@@ -7,7 +7,9 @@
 #include <cstdint>
 #include <exception>
 #include <filesystem>
+#include <functional>
 #include <iostream>
+#include <map>
 #include <optional>
 #include <string>
 #include <thread>
@@ -22,6 +24,7 @@
 #include "floor_plan.hpp"
 #include "outputs.hpp"
 #include "run.hpp"
+#include "stop_mapper.hpp"
 #include "support/command_line.hpp"
 #include "support/interruption.hpp"
 #include "support/progress.hpp"
@@ -31,7 +34,10 @@ namespace {
 
 using namespace grid_slam;
 
+enum class Maps { tiles, ancestry, stop };
+
 struct Options {
+  Maps map = Maps::tiles;
   std::string log, relations;
   bool simulate = false;
   std::filesystem::path out = "grid_slam_out";
@@ -89,15 +95,35 @@ Mapper mapper_of(const Options& options) {
   return Mapper(made);
 }
 
-Results run_with_progress(Mapper& mapper, const Input& input) {
-  const example::Interruption interruption;
-  example::Progress progress(std::clog, "scans", input.log.scans.size());
-  return run(mapper, input.log, input.relations, [&]() -> std::optional<std::string> {
+/// What to call after every scan.
+std::function<std::optional<std::string>()> watched(example::Progress& progress) {
+  return [&]() -> std::optional<std::string> {
     progress.step();
     if (const auto signal = example::Interruption::caught())
       return "interrupted (" + *signal + ") after " + std::to_string(progress.done()) + " scans";
     return std::nullopt;
-  });
+  };
+}
+
+Results map_stops(const Options& options, const Input& input) {
+  StopMapperOptions made;
+  made.storage = options.map == Maps::ancestry ? StopStorage::ancestry : StopStorage::tiles;
+  made.particles = options.particles.value_or(made.particles);
+  made.seed = options.seed.value_or(made.seed);
+  made.threads = options.threads;
+  made.map.geometry.cell_size = options.resolution.value_or(made.map.geometry.cell_size);
+  prepare_folder(options.out);
+  const example::Interruption interruption;
+  example::Progress progress(std::clog, "scans", input.log.scans.size());
+  return run_stop_mapper(input.log, made, input.relations, watched(progress));
+}
+
+Results map_occupancy(const Options& options, const Input& input, std::optional<Mapper>& mapper) {
+  mapper.emplace(mapper_of(options));
+  prepare_folder(options.out);
+  const example::Interruption interruption;
+  example::Progress progress(std::clog, "scans", input.log.scans.size());
+  return run(*mapper, input.log, input.relations, watched(progress));
 }
 
 void print(const Results& r, const std::filesystem::path& out) {
@@ -122,6 +148,10 @@ int main(int argc, char** argv) {
   auto* log = app.add_option("--log", options.log, "a CARMEN log: FLASER or ROBOTLASER1 lines");
   app.add_flag("--simulate", options.simulate, "a rendered drive around a corridor, also without --log")
       ->excludes(log);
+  app.add_option("--map", options.map,
+                 "tiles: occupancy, scans matched; stop, ancestry: DP-SLAM on shared tiles or on its tree")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, Maps>{
+          {"tiles", Maps::tiles}, {"ancestry", Maps::ancestry}, {"stop", Maps::stop}}));
   app.add_option("--relations", options.relations,
                  "relations to measure the path by: t1 t2 x y z roll pitch yaw");
   app.add_option("--out", options.out, "folder for the map, the trajectory, the summary and the report");
@@ -146,15 +176,17 @@ int main(int argc, char** argv) {
   app.add_option("--threads", options.threads, "threads")->check(example::whole_number(1, 1024));
   if (const std::optional<int> code = example::parse(app, name, argc, argv)) return *code;
   try {
+    if (options.map != Maps::tiles && !(options.save.empty() && options.load.empty()))
+      cairn::raise("--save and --load are for --map tiles");
     check_save(options.save);
     const Input input = input_of(options);
-    Mapper mapper = mapper_of(options);
-    prepare_folder(options.out);
-    Results results = run_with_progress(mapper, input);
+    std::optional<Mapper> mapper;
+    Results results =
+        options.map == Maps::tiles ? map_occupancy(options, input, mapper) : map_stops(options, input);
     results.name = input.name;
     if (results.ended_early) std::cerr << name << ": " << *results.ended_early << '\n';
     if (const auto no_report = write_outputs(results, options.out)) std::cout << *no_report << '\n';
-    if (!options.save.empty()) mapper.save(options.save);
+    if (mapper && !options.save.empty()) mapper->save(options.save);
     print(results, options.out);
     if (!example::flush_standard_output(name)) return example::exit_mistake;
     return results.ended_early ? example::exit_interrupted : example::exit_well;

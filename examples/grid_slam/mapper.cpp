@@ -15,6 +15,8 @@
 #include <cairn/scan/correlative.hpp>
 #include <cairn/scan/match.hpp>
 
+#include "filled_path.hpp"
+
 namespace grid_slam {
 
 namespace {
@@ -377,25 +379,9 @@ std::vector<cairn::PathPose<SE2>> Mapper::moved_path(std::size_t particle) const
 
 std::vector<cairn::StampedPose2> Mapper::trajectory(bool means) const {
   const auto path = belief().path(belief().best());
-  std::vector<cairn::StampedPose2> all;
-  all.reserve(scans_.size());
-  for (std::size_t k = 0; k < steps_.size(); ++k) {
-    const auto pose = [&](std::size_t step) {
-      return means ? path[step + 1].drawn_from.mean : path[step + 1].pose;
-    };
-    const std::size_t from = steps_[k].scan;
-    const std::size_t to = k + 1 < steps_.size() ? steps_[k + 1].scan : scans_.size();
-    const SE2 odometry = scans_[from].T_odom_laser.inverse();
-    Vector<3> gap = Vector<3>::Zero();
-    if (k + 1 < steps_.size())
-      gap = cairn::local(SE2(pose(k) * (odometry * scans_[to].T_odom_laser)), pose(k + 1));
-    for (std::size_t i = from; i < to; ++i) {
-      const double share = static_cast<double>(i - from) / static_cast<double>(to - from);
-      const SE2 moved = pose(k) * (odometry * scans_[i].T_odom_laser);
-      all.push_back({scans_[i].time, cairn::retract(moved, Vector<3>(share * gap))});
-    }
-  }
-  return all;
+  return filled_path(
+      scans_, steps_.size(), [&](std::size_t k) { return steps_[k].scan; },
+      [&](std::size_t k) { return means ? path[k + 1].drawn_from.mean : path[k + 1].pose; });
 }
 
 std::vector<cairn::StampedPose2> Mapper::rematched() const {

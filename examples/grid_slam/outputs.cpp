@@ -16,6 +16,7 @@
 #include <cairn/io/netpbm.hpp>
 #include <cairn/io/text.hpp>
 
+#include "map_image.hpp"
 #include "support/image_io.hpp"
 #include "support/report.hpp"
 #include "support/result_folder.hpp"
@@ -24,12 +25,10 @@ namespace grid_slam {
 
 namespace {
 
-using cairn::CellAddress;
 using example::Ink;
 using example::readable;
 using Json = nlohmann::ordered_json;
 
-constexpr std::uint8_t free_grey = 254, occupied_grey = 0, unknown_grey = 205;
 constexpr double degrees = 180 / std::numbers::pi;
 
 example::ResultFolder results_in(const std::filesystem::path& folder) {
@@ -157,36 +156,10 @@ void add_errors(example::Report& page, const Results& r) {
 }  // namespace
 
 MapImage map_image(const cairn::OccupancyGrid& grid) {
-  constexpr auto far = std::numeric_limits<std::int32_t>::max();
-  CellAddress low{far, far}, high{-far, -far};
-  const auto for_each_known = [&](const auto& visit) {
-    grid.cells().for_each_tile([&](cairn::TileAddress address, const auto& tile) {
-      const CellAddress corner = cairn::corner_of(address);
-      for (int i = 0; i < cairn::tile_cells; ++i)
-        if (const auto& cell = tile[static_cast<std::size_t>(i)]; cell.known())
-          visit(CellAddress{corner.column + i % cairn::tile_side, corner.row + i / cairn::tile_side}, cell);
-    });
-  };
-  for_each_known([&](CellAddress at, const auto&) {
-    low = {std::min(low.column, at.column), std::min(low.row, at.row)};
-    high = {std::max(high.column, at.column), std::max(high.row, at.row)};
+  return image_of(grid.geometry(), grid.cells(), [](const cairn::OccupancyCell& cell) {
+    if (!cell.known()) return unknown_grey;
+    return cell.is_obstacle() ? occupied_grey : free_grey;
   });
-  if (low.column == far) low = high = {0, 0};
-  low = {low.column - 1, low.row - 1};
-  const auto width = static_cast<std::int64_t>(high.column) + 2 - low.column;
-  const auto height = static_cast<std::int64_t>(high.row) + 2 - low.row;
-  if (width > 30000 || height > 30000)
-    cairn::raise("the map of " + std::to_string(width) + " x " + std::to_string(height) +
-                 " cells is larger than a picture of 30000 x 30000");
-  const cairn::GridGeometry& geometry = grid.geometry();
-  MapImage map{cairn::Image(static_cast<int>(width), static_cast<int>(height), unknown_grey),
-               geometry.cell_size, geometry.origin_x + low.column * geometry.cell_size,
-               geometry.origin_y + low.row * geometry.cell_size};
-  for_each_known([&](CellAddress at, const auto& cell) {
-    map.image(at.column - low.column, static_cast<int>(height) - 1 - (at.row - low.row)) =
-        cell.is_obstacle() ? occupied_grey : free_grey;
-  });
-  return map;
 }
 
 std::size_t map_bytes(const Mapper::Belief& belief) {

@@ -18,18 +18,11 @@
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/manifold/se2.hpp>
 #include <cairn/scan/occupancy_grid.hpp>
-#include <cairn/vision/image.hpp>
 
+#include "map_image.hpp"
 #include "mapper.hpp"
 
 namespace grid_slam {
-
-/// A map as a picture: 254 free, 0 occupied, 205 unknown, north up, as map_server has it.
-struct MapImage {
-  cairn::Image image;
-  double cell_size = 0;         ///< [m] a pixel
-  double left = 0, bottom = 0;  ///< of the lower left pixel's lower left corner [m]
-};
 
 /// Of all cells that are known, with a margin of one; one unknown pixel where none is.
 [[nodiscard]] MapImage map_image(const cairn::OccupancyGrid& grid);
@@ -53,6 +46,9 @@ struct Results {
   unsigned threads = 1;
   double seconds = 0, cpu_seconds = 0;
 };
+
+/// Puts the errors by relations in, where there are any.
+void measure(Results& results, const std::vector<cairn::PoseRelation>& relations);
 
 [[nodiscard]] std::string summary(const Results& results);
 [[nodiscard]] std::optional<std::string> report(const Results& results);

@@ -7,8 +7,6 @@
 
 namespace grid_slam {
 
-namespace {
-
 void measure(Results& r, const std::vector<cairn::PoseRelation>& relations) {
   if (relations.empty()) return;
   r.of_odometry = cairn::relation_error(r.odometry, relations);
@@ -16,8 +14,6 @@ void measure(Results& r, const std::vector<cairn::PoseRelation>& relations) {
   r.of_means = cairn::relation_error(r.means, relations);
   r.of_rematched = cairn::relation_error(r.rematched, relations);
 }
-
-}  // namespace
 
 Results run(Mapper& mapper, const cairn::CarmenLog& log, const std::vector<cairn::PoseRelation>& relations,
             const std::function<std::optional<std::string>()>& on_scan) {

@@ -1,0 +1,64 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// A grid as a picture that ROS' map_server reads.
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <string>
+
+#include <cairn/core/check.hpp>
+#include <cairn/grid/tile.hpp>
+#include <cairn/vision/image.hpp>
+
+namespace grid_slam {
+
+inline constexpr std::uint8_t free_grey = 254, occupied_grey = 0, unknown_grey = 205;
+
+/// A map as a picture: 254 free, 0 occupied, 205 unknown, north up, as map_server has it.
+struct MapImage {
+  cairn::Image image;
+  double cell_size = 0;         ///< [m] a pixel
+  double left = 0, bottom = 0;  ///< of the lower left pixel's lower left corner [m]
+};
+
+/// Of all cells of shared tiles, or of a tree of ancestors, whose grey(cell) is not unknown, with a margin of
+/// one; one unknown pixel where there is none. Throws cairn::Error where the picture would be too large.
+template <class Cells, class Grey>
+[[nodiscard]] MapImage image_of(const cairn::GridGeometry& geometry, const Cells& cells, const Grey& grey) {
+  using cairn::CellAddress;
+  constexpr auto far = std::numeric_limits<std::int32_t>::max();
+  CellAddress low{far, far}, high{-far, -far};
+  const auto for_each_known = [&](const auto& visit) {
+    cells.for_each_tile([&](cairn::TileAddress address, const auto& tile) {
+      const CellAddress corner = cairn::corner_of(address);
+      for (int i = 0; i < cairn::tile_cells; ++i)
+        if (const std::uint8_t g = grey(tile[static_cast<std::size_t>(i)]); g != unknown_grey)
+          visit(CellAddress{corner.column + i % cairn::tile_side, corner.row + i / cairn::tile_side}, g);
+    });
+  };
+  for_each_known([&](CellAddress at, std::uint8_t) {
+    low = {std::min(low.column, at.column), std::min(low.row, at.row)};
+    high = {std::max(high.column, at.column), std::max(high.row, at.row)};
+  });
+  if (low.column == far) low = high = {0, 0};
+  low = {low.column - 1, low.row - 1};
+  const auto width = static_cast<std::int64_t>(high.column) + 2 - low.column;
+  const auto height = static_cast<std::int64_t>(high.row) + 2 - low.row;
+  if (width > 30000 || height > 30000)
+    cairn::raise("the map of " + std::to_string(width) + " x " + std::to_string(height) +
+                 " cells is larger than a picture of 30000 x 30000");
+  MapImage map{cairn::Image(static_cast<int>(width), static_cast<int>(height), unknown_grey),
+               geometry.cell_size, geometry.origin_x + low.column * geometry.cell_size,
+               geometry.origin_y + low.row * geometry.cell_size};
+  for_each_known([&](CellAddress at, std::uint8_t g) {
+    map.image(at.column - low.column, static_cast<int>(height) - 1 - (at.row - low.row)) = g;
+  });
+  return map;
+}
+
+}  // namespace grid_slam

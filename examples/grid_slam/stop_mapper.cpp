@@ -1,0 +1,178 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "stop_mapper.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <set>
+
+#include <cairn/core/check.hpp>
+#include <cairn/filter/conditional.hpp>
+#include <cairn/grid/ancestry.hpp>
+#include <cairn/grid/shared_tiles.hpp>
+
+#include "filled_path.hpp"
+#include "map_image.hpp"
+
+namespace grid_slam {
+
+namespace {
+
+using cairn::Gaussian;
+using cairn::Matrix;
+using cairn::SE2;
+using cairn::StopCell;
+using cairn::Vector;
+using OnScan = std::function<std::optional<std::string>()>;
+
+/// ConditionalMap over stops.
+template <class Storage>
+struct StopMap {
+  using Pose = SE2;
+  using Observation = cairn::LaserScan;
+  cairn::StopGrid<Storage> grid;
+
+  [[nodiscard]] double log_likelihood(const Pose& x, const Observation& z) const {
+    return grid.log_likelihood(z, x);
+  }
+  void insert(const Pose& x, const Observation& z) { grid.insert(z, x); }
+};
+
+using OnTiles = StopMap<cairn::SharedTiles<StopCell>>;
+using OnAncestry = StopMap<cairn::Ancestry<StopCell>>;
+
+std::size_t bytes_of(const cairn::MappedPaths<OnTiles>& belief) {
+  std::set<const void*> seen;
+  std::size_t bytes = 0;
+  for (std::size_t i = 0; i < belief.size(); ++i)
+    belief[i].map.grid.cells().for_each_tile([&](cairn::TileAddress, const auto& tile) {
+      if (seen.insert(&tile).second) bytes += sizeof tile;
+    });
+  return bytes;
+}
+std::size_t bytes_of(const cairn::MappedPaths<OnAncestry>& belief) {
+  return belief[0].map.grid.cells().bytes();
+}
+
+template <class Map>
+class StopMapper {
+public:
+  using Belief = cairn::MappedPaths<Map>;
+
+  StopMapper(const SE2& start, const StopMapperOptions& options)
+      : options_(options),
+        belief_(start, Map{cairn::StopGrid<typename Storage<Map>::type>(options.map)}, options.particles) {}
+
+  void add(const cairn::StampedScan& scan) {
+    bool due = scans_.empty();
+    if (!due) {
+      const SE2 moved = scans_.back().T_odom_laser.inverse() * scan.T_odom_laser;
+      moved_ = moved_ * moved;
+      distance_ += moved.translation().norm();
+      angle_ += std::abs(moved.angle());
+      due = distance_ >= options_.step_distance || angle_ >= options_.step_angle;
+    }
+    scans_.push_back(scan);
+    if (due) process(scan);
+  }
+
+  void put_into(Results& r) const {
+    r.steps = steps_;
+    r.scans = scans_.size();
+    for (const auto& scan : scans_) r.odometry.push_back({scan.time, scan.T_odom_laser});
+    const auto path = belief_.path(belief_.best());
+    r.drawn = filled_path(
+        scans_, steps_.size(), [&](std::size_t k) { return steps_[k].scan; },
+        [&](std::size_t k) { return path[k + 1].pose; });
+    r.means = r.drawn;  // what the motion says alone is no estimate
+    r.rematched = r.drawn;
+    r.newest = belief_.pose();
+    const auto& grid = belief_[belief_.best()].map.grid;
+    r.map = image_of(options_.map.geometry, grid.cells(), [&](const StopCell& cell) {
+      constexpr double enough = 0.2;  // of the beams through a cell
+      if (!(cell.length > 0)) return unknown_grey;
+      const double stopped = -std::expm1(-grid.stops_per_metre(cell) * options_.map.geometry.cell_size);
+      return stopped > enough ? occupied_grey : free_grey;
+    });
+    r.bytes = bytes_of(belief_);
+    for (std::size_t i = 0; i < belief_.size(); ++i) {
+      if (i > 0 && belief_[i].node == belief_[i - 1].node) continue;
+      auto& each = r.paths.emplace_back();
+      for (const auto& pose : belief_.path(i)) each.push_back(pose.pose);
+    }
+  }
+
+private:
+  template <class M>
+  struct Storage;
+  template <class S>
+  struct Storage<StopMap<S>> {
+    using type = S;
+  };
+
+  void process(const cairn::StampedScan& scan) {
+    Matrix<3> noise = Vector<3>(1e-6, 1e-6, 1e-6).asDiagonal();
+    if (!steps_.empty()) {
+      const OdometryNoise& n = options_.odometry;
+      const double along = n.offset + n.per_metre * distance_ + n.per_radian * angle_;
+      const double turn = n.angle_offset + n.angle_per_metre * distance_ + n.angle_per_radian * angle_;
+      noise = Vector<3>(along * along, along * along, turn * turn).asDiagonal();
+    }
+    const cairn::ConditionalFilter filter{
+        .resample_below = options_.resample_below, .seed = options_.seed, .threads = options_.threads};
+    const auto motion = [&](const SE2& x, std::size_t) { return Gaussian<SE2>{x * moved_, noise}; };
+    const cairn::MappingStep step =
+        filter.step(belief_, motion, cairn::FromMotion{.draws = options_.draws}, scan.scan);
+    const std::size_t index = scans_.size() - 1;
+    if (!step.accepted())
+      cairn::raise("grid_slam: scan " + std::to_string(index) + ": " + cairn::explain(step.status));
+    steps_.push_back({index, step.effective_size, step.resampled, false, belief_.pose()});
+    moved_ = SE2();
+    distance_ = angle_ = 0;
+  }
+
+  StopMapperOptions options_;
+  Belief belief_;
+  std::vector<cairn::StampedScan> scans_;
+  std::vector<StepRecord> steps_;
+  SE2 moved_;
+  double distance_ = 0, angle_ = 0;
+};
+
+template <class Map>
+void map_log(Results& r, const cairn::CarmenLog& log, const StopMapperOptions& options,
+             const OnScan& on_scan) {
+  const auto begin = std::chrono::steady_clock::now();
+  const std::clock_t cpu = std::clock();
+  StopMapper<Map> mapper(log.scans.front().T_odom_laser, options);
+  for (const cairn::StampedScan& scan : log.scans) {
+    mapper.add(scan);
+    if (on_scan) r.ended_early = on_scan();
+    if (r.ended_early) break;
+  }
+  r.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  r.cpu_seconds = static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC;
+  mapper.put_into(r);
+}
+
+}  // namespace
+
+Results run_stop_mapper(const cairn::CarmenLog& log, const StopMapperOptions& options,
+                        const std::vector<cairn::PoseRelation>& relations, const OnScan& on_scan) {
+  if (log.scans.empty()) cairn::raise("grid_slam: expected a log with a scan");
+  if (options.draws == 0) cairn::raise("grid_slam: expected at least one draw a particle");
+  Results r;
+  r.seed = options.seed;
+  r.particles = options.particles;
+  r.threads = options.threads;
+  if (options.storage == StopStorage::tiles)
+    map_log<OnTiles>(r, log, options, on_scan);
+  else
+    map_log<OnAncestry>(r, log, options, on_scan);
+  measure(r, relations);
+  return r;
+}
+
+}  // namespace grid_slam

@@ -1,0 +1,53 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// DP-SLAM: particles drawn from odometry, many of each, over maps of how much every cell stops; the maps as
+/// a tree of ancestors or as shared tiles, with the same result bit for bit.
+///
+/// No matching and no loop closing: what closes a loop is a particle that came back right. (A. Eliazar,
+/// R. Parr, "DP-SLAM 2.0", ICRA 2004.)
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include <cairn/eval/relations.hpp>
+#include <cairn/io/carmen.hpp>
+#include <cairn/scan/stop_grid.hpp>
+
+#include "mapper.hpp"
+#include "outputs.hpp"
+
+namespace grid_slam {
+
+enum class StopStorage { tiles, ancestry };
+
+struct StopMapperOptions {
+  StopStorage storage = StopStorage::ancestry;
+  std::size_t particles = 50;
+  std::size_t draws = 10;  ///< of each particle, of which one is kept
+  std::uint64_t seed = 1;
+  unsigned threads = 1;
+  cairn::StopOptions map{.every = 5};
+  OdometryNoise odometry{.offset = 0.01,
+                         .per_metre = 0.05,
+                         .per_radian = 0.02,
+                         .angle_offset = 0.005,
+                         .angle_per_metre = 0.03,
+                         .angle_per_radian = 0.05};
+  double step_distance = 0.2;  ///< [m] between processed scans
+  double step_angle = 0.15;    ///< [rad]
+  double resample_below = 0.5;
+};
+
+/// Maps the log; the rest as run(). Throws cairn::Error on options out of range.
+[[nodiscard]] Results run_stop_mapper(const cairn::CarmenLog& log, const StopMapperOptions& options,
+                                      const std::vector<cairn::PoseRelation>& relations,
+                                      const std::function<std::optional<std::string>()>& on_scan = {});
+
+}  // namespace grid_slam
