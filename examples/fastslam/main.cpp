@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
-#include <exception>
 #include <filesystem>
 #include <iostream>
 #include <optional>
@@ -23,7 +22,6 @@
 #include "support/command_line.hpp"
 #include "support/interruption.hpp"
 #include "support/progress.hpp"
-#include "support/standard_output.hpp"
 
 namespace {
 
@@ -114,7 +112,7 @@ int main(int argc, char** argv) {
       "Maps landmarks from odometry and sightings: a particle filter, each particle with its own map."};
   add_options(app, options);
   if (const std::optional<int> code = example::parse(app, name, argc, argv)) return *code;
-  try {
+  return example::exit_code_of(name, [&]() -> int {
     LandmarkLog log = log_of(options);
     if (options.identities == "withheld") log.withhold_identities();
     options.slam.proposal = options.proposal == "motion" ? ProposalKind::motion : ProposalKind::landmarks;
@@ -125,10 +123,6 @@ int main(int argc, char** argv) {
     if (results.ended_early) std::cerr << name << ": " << *results.ended_early << '\n';
     if (const auto no_report = write_outputs(results, options.out)) std::cout << *no_report << '\n';
     print(results, options.out);
-    if (!example::flush_standard_output(name)) return example::exit_mistake;
     return results.ended_early ? example::exit_interrupted : example::exit_well;
-  } catch (const std::exception& error) {
-    std::cerr << name << ": " << error.what() << '\n';
-    return example::exit_mistake;
-  }
+  });
 }

@@ -6,7 +6,6 @@
 // Exit codes: 0 well; 2 a mistake; 4 interrupted, the results are of the scans before.
 #include <algorithm>
 #include <cstdint>
-#include <exception>
 #include <filesystem>
 #include <iostream>
 #include <map>
@@ -22,7 +21,6 @@
 #include "support/command_line.hpp"
 #include "support/interruption.hpp"
 #include "support/progress.hpp"
-#include "support/standard_output.hpp"
 
 namespace {
 
@@ -71,17 +69,13 @@ int main(int argc, char** argv) {
       ->check(example::whole_number(0));
   app.add_option("--threads", options.threads, "threads")->check(example::whole_number(1, 1024));
   if (const std::optional<int> code = example::parse(app, name, argc, argv)) return *code;
-  try {
+  return example::exit_code_of(name, [&]() -> int {
     prepare_folder(out);
     const Drive drive = simulated_drive({.seed = options.seed, .laps = laps});
     const Results results = run_with_progress(drive, options);
     if (results.ended_early) std::cerr << name << ": " << *results.ended_early << '\n';
     if (const auto no_report = write_outputs(results, out)) std::cout << *no_report << '\n';
     print(results, out);
-    if (!example::flush_standard_output(name)) return example::exit_mistake;
     return results.ended_early ? example::exit_interrupted : example::exit_well;
-  } catch (const std::exception& error) {
-    std::cerr << name << ": " << error.what() << '\n';
-    return example::exit_mistake;
-  }
+  });
 }

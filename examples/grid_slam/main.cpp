@@ -5,7 +5,6 @@
 // Exit codes: 0 well; 2 a mistake; 4 interrupted, the results are of the scans before.
 #include <algorithm>
 #include <cstdint>
-#include <exception>
 #include <filesystem>
 #include <functional>
 #include <iostream>
@@ -28,7 +27,6 @@
 #include "support/command_line.hpp"
 #include "support/interruption.hpp"
 #include "support/progress.hpp"
-#include "support/standard_output.hpp"
 
 namespace {
 
@@ -175,7 +173,7 @@ int main(int argc, char** argv) {
       ->check(example::whole_number(0));
   app.add_option("--threads", options.threads, "threads")->check(example::whole_number(1, 1024));
   if (const std::optional<int> code = example::parse(app, name, argc, argv)) return *code;
-  try {
+  return example::exit_code_of(name, [&]() -> int {
     if (options.map != Maps::tiles && !(options.save.empty() && options.load.empty()))
       cairn::raise("--save and --load are for --map tiles");
     check_save(options.save);
@@ -188,10 +186,6 @@ int main(int argc, char** argv) {
     if (const auto no_report = write_outputs(results, options.out)) std::cout << *no_report << '\n';
     if (mapper && !options.save.empty()) mapper->save(options.save);
     print(results, options.out);
-    if (!example::flush_standard_output(name)) return example::exit_mistake;
     return results.ended_early ? example::exit_interrupted : example::exit_well;
-  } catch (const std::exception& error) {
-    std::cerr << name << ": " << error.what() << '\n';
-    return example::exit_mistake;
-  }
+  });
 }

@@ -8,6 +8,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <exception>
 #include <iostream>
 #include <limits>
 #include <optional>
@@ -69,6 +70,19 @@ inline CLI::Validator number_between(double low, double high) {
             return "expected a number from " + range + ", found " + detail::shown(word);
           },
           range};
+}
+
+/// Does a program's work, which returns an exit code. What it throws is said in a line, and so is a standard
+/// output that did not take its words: mistakes both.
+template <class Work>
+[[nodiscard]] int exit_code_of(const std::string& name, const Work& work) {
+  try {
+    const int code = work();
+    return flush_standard_output(name) ? code : exit_mistake;
+  } catch (const std::exception& error) {
+    std::cerr << name << ": " << error.what() << '\n';
+    return exit_mistake;
+  }
 }
 
 /// Parses the command line of the program `name`. Returns an exit code where the program is to end with it:
