@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 //
-// The scoreboard of FastSLAM: scripts/scoreboard fastslam. Five seeds of published logs with one setting, a
+// The scoreboard of FastSLAM: scripts/scoreboard fastslam. Eleven seeds of published logs with one setting, a
 // published map with simulated drives, and what it costs to keep many landmarks in many particles. EKF-SLAM
 // on the library's joint Gaussian runs on the same logs.
 #include <algorithm>
@@ -32,14 +32,15 @@ using namespace fastslam;
 using cairn::SE2;
 using cairn::Vector;
 
-constexpr std::uint64_t seeds = 5;
+// Settings were looked for with the seeds 1 to 5, which then flatter: these are others.
+constexpr std::uint64_t first_seed = 101, seeds = 11;
 
 double median(std::vector<double> values) {
   std::ranges::sort(values);
   return values[values.size() / 2];
 }
 std::string worst(const std::vector<double>& values) {
-  return "worst of 5 seeds " + std::to_string(*std::ranges::max_element(values));
+  return "worst of 11 seeds " + std::to_string(*std::ranges::max_element(values));
 }
 
 SlamOptions options_of(std::size_t particles, std::uint64_t seed) {
@@ -51,7 +52,7 @@ struct Runs {
 };
 Runs runs_of(const LandmarkLog& log, std::size_t particles) {
   Runs runs;
-  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+  for (std::uint64_t seed = first_seed; seed < first_seed + seeds; ++seed) {
     const Results r = run(log, options_of(particles, seed));
     runs.path.push_back(*r.path_error);
     runs.landmarks.push_back(r.landmark_error.value_or(0));
@@ -122,14 +123,15 @@ void add_park(Scoreboard& board) {
   const auto folder = cairn_test::real_data("victoria_park");
   Row error{.name = "Victoria Park: rms to the batch optimum, M = 50", .unit = "m", .must = 3, .aim = 1};
   Row few{.name = "the same, M = 10", .unit = "m"};
+  Row wider{.name = "the same, M = 50, motion of 15 times, sightings of 1/4 of the variance", .unit = "m"};
   Row time{.name = "the same, M = 50: CPU", .unit = "s", .must = 10, .aim = 1};
   if (folder) {
-    const LandmarkLog log = read_graph(*folder / "victoria_park_graph.txt");
+    LandmarkLog log = read_graph(*folder / "victoria_park_graph.txt");
     std::vector<Vector<2>> is;
     for (const SE2& pose : growing_batch_optimum(log).poses) is.push_back(pose.translation());
     const auto errors = [&](std::size_t particles, std::vector<double>& seconds) {
       std::vector<double> all;
-      for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+      for (std::uint64_t seed = first_seed; seed < first_seed + seeds; ++seed) {
         const Results r = run(log, options_of(particles, seed));
         all.push_back(fitted(at_frames(log, r.mean), is));
         seconds.push_back(r.cpu_seconds);
@@ -144,16 +146,21 @@ void add_park(Scoreboard& board) {
     few.note = worst(ten);
     time.measured = median(seconds);
     const EkfSlamRun ekf = ekf_slam(log);
+    log.motion_factor = 15;
+    log.sighting_factor = 0.25;
+    wider.measured = median(errors(50, ignored));
+    wider.note = "factors chosen on this log";
     std::vector<Vector<2>> path;
     for (const auto& pose : ekf.poses) path.push_back(pose.mean.translation());
     error.rival = fitted(path, is);
     time.rival = ekf.cpu_seconds;
     error.rival_name = time.rival_name = "EKF-SLAM, its online path";
   } else {
-    error.note = few.note = time.note = "no data";
+    error.note = few.note = wider.note = time.note = "no data";
   }
   board.add(error);
   board.add(few);
+  board.add(wider);
   board.add(time);
 }
 

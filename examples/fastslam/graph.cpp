@@ -113,17 +113,13 @@ private:
 }  // namespace
 
 LandmarkLog read_graph(const std::filesystem::path& path) {
-  // At Victoria Park's optimum headings err as the graph says (chi^2 1.3 a number), sightings by a quarter of
-  // its variance.
   LandmarkLog log{.name = path.filename().string(),
                   .sensor = {.range_sigma = 0.5,
                              .bearing_sigma = 0,
                              .across_sigma = 0,
                              .farthest = 60,
                              .half_view = 1.5,
-                             .detection = 0.3},
-                  .motion_factor = 15,
-                  .sighting_factor = 0.25};
+                             .detection = 0.3}};
   GraphReader(path, log).read();
   return log;
 }
