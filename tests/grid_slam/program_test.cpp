@@ -130,6 +130,27 @@ TEST_SUITE("grid_slam/program") {
     CHECK(cairn::read_file(folder / "whole.map") == cairn::read_file(folder / "end.map"));
   }
 
+  TEST_CASE(
+      "grid_slam: DP-SLAM gives the same bytes on the tree of ancestors and on tiles, for any number of "
+      "threads") {
+    const cairn_test::Folder folder;
+    folder.put("log", short_log(60));
+    for (const std::string& way : {std::string("stop --threads 1"), std::string("ancestry --threads 1"),
+                                   std::string("ancestry --threads 3")}) {
+      const Outcome outcome = run("--particles 8 --seed 5 --map " + way + " --log \"" +
+                                  (folder / "log").string() + "\" --out \"" + (folder / way).string() + "\"");
+      CAPTURE(outcome.words);
+      REQUIRE(outcome.code == 0);
+      CHECK(names_in(folder / way) == results());
+      for (const char* name : {"map.pgm", "map.yaml", "trajectory.txt"})
+        CHECK(cairn::read_file(folder / "stop --threads 1" / name) == cairn::read_file(folder / way / name));
+    }
+    CHECK(cairn::read_file(folder / "ancestry --threads 1" / "summary.json") ==
+          cairn::read_file(folder / "ancestry --threads 3" / "summary.json"));
+    CHECK(run("--map stop --save \"" + (folder / "map").string() + "\"").code == 2);
+    CHECK(run("--map paper").code == 2);
+  }
+
   TEST_CASE("grid_slam: a map that is none, or another, is a line and exit code 2, and nothing is lost") {
     const cairn_test::Folder folder;
     folder.put("log", short_log(40));

@@ -12,9 +12,9 @@
 /// grow with time. (A. Eliazar, R. Parr, "DP-SLAM 2.0", ICRA 2004, sec. II.) The same values as SharedTiles,
 /// where that copies tiles this copies cells: it wins where many grids differ in few cells each.
 ///
-/// Copying O(1); reading O(nodes between the leaf and the entry's times entries of the cell); writing the
-/// same, and O(entries of the cell) at the first write to it; dying O(own entries). Grids of one tree may be
-/// read by several threads at once, but not while one of them is written, copied or destroyed: guard().
+/// Copying O(1); reading O(nodes between the leaf and the entry's, log(entries of the cell) each); writing
+/// the same, and O(entries of the cell) at the first write to it; dying O(own entries). Grids of one tree may
+/// be read by several threads at once, but not while one of them is written, copied or destroyed: guard().
 #pragma once
 
 #include <algorithm>
@@ -84,7 +84,7 @@ public:
   [[nodiscard]] std::size_t nodes() const noexcept { return tree_->nodes(); }
   /// Entries of all cells of the tree.
   [[nodiscard]] std::size_t entries() const noexcept { return tree_->entries(); }
-  /// Bytes of entries and of the lists of who wrote what, as they are allocated.
+  /// Bytes of entries and of the lists of who wrote what, without what vectors keep in reserve.
   [[nodiscard]] std::size_t bytes() const noexcept { return tree_->bytes(); }
   /// Whether every promise about the tree holds, by looking at all of it.
   [[nodiscard]] bool consistent() const { return tree_->consistent(); }
@@ -99,7 +99,7 @@ private:
     std::uint32_t name;
     Cell value;
   };
-  using Entries = std::vector<Entry>;  // of one cell, at most one a name
+  using Entries = std::vector<Entry>;  // of one cell, by rising names, at most one each
 
   class Tree {
   public:
@@ -125,8 +125,7 @@ private:
     [[nodiscard]] const Cell* find(NodeNumber node, const Entries& entries) const {
       if (entries.empty()) return nullptr;
       for (; node != none; node = nodes_[node].parent)
-        for (const Entry& entry : entries)
-          if (entry.name == nodes_[node].name) return &entry.value;
+        if (const Entry* entry = entry_of(entries, nodes_[node].name)) return &entry->value;
       return nullptr;
     }
 
@@ -137,8 +136,7 @@ private:
       const Cell* inherited = find(node, entries);
       const Cell value = inherited == nullptr ? Cell{} : *inherited;
       written_[name].push_back(cell);
-      entries.push_back({name, value});
-      return entries.back().value;
+      return put(entries, {name, value}).value;
     }
 
     [[nodiscard]] const SharedTiles<Entries>& cells() const noexcept { return cells_; }
@@ -149,11 +147,11 @@ private:
       return sum;
     }
     [[nodiscard]] std::size_t bytes() const noexcept {
-      std::size_t sum = nodes_.capacity() * sizeof(Node) + written_.capacity() * sizeof(written_[0]);
-      for (const auto& cells : written_) sum += cells.capacity() * sizeof(CellAddress);
+      std::size_t sum = nodes() * (sizeof(Node) + sizeof(written_[0]));
+      for (const auto& cells : written_) sum += cells.size() * sizeof(CellAddress);
       cells_.for_each_tile([&](TileAddress, const auto& tile) {
         sum += sizeof tile;
-        for (const Entries& entries : tile) sum += entries.capacity() * sizeof(Entry);
+        for (const Entries& entries : tile) sum += entries.size() * sizeof(Entry);
       });
       return sum;
     }
@@ -215,16 +213,18 @@ private:
     }
 
     [[nodiscard]] Entries& entries_of(CellAddress cell) { return cells_.write(cell); }
-    [[nodiscard]] static Entry* entry_of(Entries& entries, std::uint32_t name) noexcept {
-      for (Entry& entry : entries)
-        if (entry.name == name) return &entry;
-      return nullptr;
+    [[nodiscard]] static auto place_of(auto& entries, std::uint32_t name) noexcept {
+      return std::ranges::lower_bound(entries, name, {}, &Entry::name);
     }
-    static void erase(Entries& entries, std::uint32_t name) {
-      Entry* out = entry_of(entries, name);
-      *out = std::move(entries.back());
-      entries.pop_back();
+    /// The entry of this name, or null.
+    [[nodiscard]] static auto* entry_of(auto& entries, std::uint32_t name) noexcept {
+      const auto place = place_of(entries, name);
+      return place != entries.end() && place->name == name ? &*place : nullptr;
     }
+    static Entry& put(Entries& entries, Entry entry) {
+      return *entries.insert(place_of(entries, entry.name), std::move(entry));
+    }
+    static void erase(Entries& entries, std::uint32_t name) { entries.erase(place_of(entries, name)); }
 
     /// Ends a node that has no use any more, and then its parent where that has none without it.
     void tidy(NodeNumber node) {
@@ -248,12 +248,12 @@ private:
       const std::uint32_t kept = keep_newer ? newer : older, given = keep_newer ? older : newer;
       for (const CellAddress cell : written_[given]) {
         Entries& entries = entries_of(cell);
-        Entry* from = entry_of(entries, given);
+        Entry from = std::move(*entry_of(entries, given));
+        erase(entries, given);
         if (Entry* to = entry_of(entries, kept)) {
-          if (!keep_newer) to->value = from->value;
-          erase(entries, given);
+          if (!keep_newer) to->value = std::move(from.value);
         } else {
-          from->name = kept;
+          put(entries, {kept, std::move(from.value)});
           written_[kept].push_back(cell);
         }
       }
