@@ -97,7 +97,7 @@ int main(int argc, char** argv) {
     rows.push_back({plot.x_values.back()});
   }
   double wrong = 0, distance = 0, ours = 0, of_library = 0;
-  for (const std::size_t dimension : {4, 8, 16, 64}) {
+  for (const std::size_t dimension : std::vector<std::size_t>{4, 8, 16, 64}) {
     std::vector<Descriptor> all(count, Descriptor(dimension));
     for (Descriptor& descriptor : all)
       for (float& x : descriptor) x = static_cast<float>(random.normal());
