@@ -86,7 +86,7 @@ int main(int argc, char** argv) {
        60,
        1000,
        {{"nothing-drawn", "the pose is the proposal's mean (PythonRobotics, fast_slam2.py, #149)"},
-        {"shared-maps", "copies of a particle write into one map (PythonRobotics, fast_slam)"}}},
+        {"shared-maps", "copies of a particle write into one map (PythonRobotics, fast_slam2.py)"}}},
       argc, argv);
   constexpr std::size_t runs = 6;
   std::vector<double> steps(lesson.steps()), nees(steps.size()), effective(steps.size());
