@@ -14,7 +14,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <numbers>
 #include <set>
 #include <string>
@@ -24,7 +23,6 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/random.hpp>
 #include <cairn/filter/gaussian.hpp>
-#include <cairn/index/landmark_ledger.hpp>
 #include <cairn/manifold/product.hpp>
 #include <cairn/manifold/se2.hpp>
 #include <cairn/manifold/so2.hpp>
@@ -246,41 +244,6 @@ inline void extend(PlaneCurve& curve, const cairn::Vector<2>& point) {
     }
   return map;
 }
-
-[[nodiscard]] inline double distance(const cairn::Vector<2>& a, const cairn::Vector<2>& b) {
-  return std::hypot(a(0) - b(0), a(1) - b(1));
-}
-
-/// To the nearest of some places.
-[[nodiscard]] inline double distance(const cairn::Vector<2>& a, const std::vector<cairn::Vector<2>>& places) {
-  double least = std::numeric_limits<double>::infinity();
-  for (const cairn::Vector<2>& b : places) least = std::min(least, distance(a, b));
-  return least;
-}
-
-/// Places that may be landmarks: on probation (cairn::LandmarkLedger) until they have been seen in enough
-/// steps.
-class CandidateLandmarks {
-public:
-  explicit CandidateLandmarks(cairn::Probation probation) : ledger_(probation) {}
-
-  /// Something was seen here, which is the candidate less than `radius` [m] away, or a new one.
-  void sight(const cairn::Vector<2>& at, double radius) {
-    for (cairn::LandmarkId id = 0; id < places_.size(); ++id)
-      if (ledger_.contains(id) && distance(at, places_[id]) < radius) return ledger_.sighted(id);
-    (void)ledger_.add();
-    places_.push_back(at);
-  }
-  void end_step() {
-    for (const cairn::LandmarkId id : ledger_.advance().promoted) promoted_.push_back(places_[id]);
-  }
-  /// Those that have passed.
-  [[nodiscard]] const std::vector<cairn::Vector<2>>& promoted() const noexcept { return promoted_; }
-
-private:
-  cairn::LandmarkLedger ledger_;
-  std::vector<cairn::Vector<2>> places_, promoted_;
-};
 
 /// How many landmarks a log has met.
 [[nodiscard]] inline std::size_t landmarks_met(const std::vector<WorldStep>& log) {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: MIT
 //
 /// @file
-/// kd-trees that are small enough to be read, for the lessons on walking them. In the plane the longer side
+/// A kd-tree that is small enough to be read, for the lesson on walking one. The longer side
 /// of a cell is cut at the median of its points, down to leaves of at most eight (J. Friedman, J. Bentley, R.
 /// Finkel, ACM TOMS 3, 1977, who cut the axis of the largest spread of the points). cairn::KdTree is the one
 /// to use.
@@ -14,8 +14,6 @@
 #include <string>
 #include <utility>
 #include <vector>
-
-#include <cairn/core/statistics.hpp>
 
 #include "support/report.hpp"
 
@@ -58,46 +56,6 @@ struct Cell {
   left.high[axis] = right.low[axis] = cell.split;
   cell.halves = {build(shops, left, drawn), build(shops, right, drawn)};
   return cell;
-}
-
-/// Many numbers that stand for one thing.
-using Descriptor = std::vector<float>;
-
-struct Node {                                      // of a tree whose leaves hold up to 16 descriptors
-  std::size_t begin, end, axis = 0, children = 0;  // children: the first of two, or 0 in a leaf
-  float split = 0;
-};
-
-/// The axis along which a node's descriptors vary most.
-[[nodiscard]] inline std::size_t widest_axis(const std::vector<Descriptor>& all, const Node& node) {
-  double largest = -1;
-  std::size_t widest = 0;
-  for (std::size_t a = 0; a < all[0].size(); ++a) {
-    cairn::RunningMoments moments;
-    for (std::size_t i = node.begin; i < node.end; ++i) moments.add(static_cast<double>(all[i][a]));
-    if (moments.variance() > largest) largest = moments.variance(), widest = a;
-  }
-  return widest;
-}
-
-/// The tree over descriptors of one length, which it puts in the order of the leaves; O(n d log n). The root
-/// is the first node.
-[[nodiscard]] inline std::vector<Node> build(std::vector<Descriptor>& all) {
-  std::vector<Node> nodes{{0, all.size()}};
-  for (std::size_t n = 0; n < nodes.size(); ++n) {
-    Node node = nodes[n];
-    if (node.end - node.begin <= 16) continue;
-    const std::size_t axis = node.axis = widest_axis(all, node), middle = (node.begin + node.end) / 2;
-    const auto at = [&](std::size_t i) { return all.begin() + static_cast<std::ptrdiff_t>(i); };
-    std::nth_element(at(node.begin), at(middle), at(node.end),
-                     [axis](const Descriptor& x, const Descriptor& y) { return x[axis] < y[axis]; });
-    node.split = all[middle][axis];
-    node.children = nodes.size();
-    nodes[n] = node;
-    nodes.push_back({node.begin, middle});
-    nodes.push_back({middle, node.end});
-  }
-  return nodes;
 }
 
 }  // namespace example
