@@ -11,7 +11,6 @@
 /// The noise is that which the filters are told of, so that a filter without a mistake has no excuse.
 #pragma once
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
