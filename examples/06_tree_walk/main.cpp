@@ -81,7 +81,7 @@ int main(int argc, char** argv) {
   example::Lesson lesson(
       {"06_tree_walk",
        "A kd-tree: what need not be looked at",
-       "Which of 200 shops is the nearest? Look at twenty.",
+       "Which of 200 shops is the nearest? A look at a dozen proves it.",
        200,
        20,
        5000,
