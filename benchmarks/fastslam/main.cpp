@@ -168,7 +168,7 @@ void add_park(Scoreboard& board) {
 std::vector<double> mean_nees(const PointMap& map, std::size_t particles, std::size_t frames) {
   constexpr std::uint64_t runs = 20;
   std::vector<double> nees(frames, 0);
-  for (std::uint64_t seed = 1; seed <= runs; ++seed) {
+  for (std::uint64_t seed = first_seed; seed < first_seed + runs; ++seed) {
     const Results r = run(simulated(map, seed, frames), options_of(particles, seed));
     for (std::size_t k = 0; k < frames; ++k) nees[k] += *r.steps[k].nees / runs;
   }
