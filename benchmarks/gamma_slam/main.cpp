@@ -27,7 +27,8 @@ struct Runs {
 
 Runs runs_of(Cells cells, std::uint64_t seeds) {
   Runs runs;
-  for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+  constexpr std::uint64_t first = 6;  // by 1 to 5 the example's settings were chosen
+  for (std::uint64_t seed = first; seed < first + seeds; ++seed) {
     const Drive drive = simulated_drive({.seed = seed});
     RunOptions options{.cells = cells, .seed = seed};
     options.threads = std::max(1U, std::thread::hardware_concurrency());
@@ -82,7 +83,7 @@ int main(int argc, char** argv) {
              .unit = "ms",
              .rival_name = "no rival"});
   const Runs variance = runs_of(Cells::variance, 1);
-  board.add({.name = "error over visual odometry's, cells without means, seed 1",
+  board.add({.name = "error over visual odometry's, cells without means, seed 6",
              .measured = variance.share.front(),
              .unit = "",
              .rival_name = "no rival",
