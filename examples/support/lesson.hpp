@@ -90,6 +90,9 @@ public:
   /// there are columns.
   void csv(const std::string& name, const std::vector<std::string>& columns, const Rows& rows);
 
+  /// A file of this name and text among the results.
+  void file(const std::string& name, const std::string& text) { tables_.push_back({name, text}); }
+
   /// Writes page and tables, prints "verdict: green" or "verdict: RED (names)", and returns the exit code. A
   /// lesson without a verdict is red.
   [[nodiscard]] int finish();
