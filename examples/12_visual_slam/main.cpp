@@ -24,12 +24,13 @@
 // Then the path goes to a file in the format TUM, is read again and held against the truth: ATE and RPE
 // (J. Sturm et al., "A benchmark for the evaluation of RGB-D SLAM systems", IROS 2012, section V).
 //
-// LOOK AT  the picture: threads from where the map expects a landmark to where it is. The path in space
+// LOOK AT  the picture: a thread leads to where the right camera has the same spot. The path in space
 // closes without any step that says "close the loop": old landmarks are seen again, and pull.
 //
 // CHANGE THIS (answers at the end of the file)
-//   1. --steps 24, the same round with larger steps: what fails first?
-//   2. Leave the landmarks of the first 10 pictures out of step 3: how large is the error at the end?
+//   1. --steps 24, the same round with larger steps: what grows?
+//   2. From picture 30 on leave the landmarks of the first 10 out of step 3: how far from the start does it
+//   end?
 //   3. budget = 2 leaves: how many links are lost, and does the pose suffer?
 #include <algorithm>
 #include <array>
@@ -40,6 +41,8 @@
 #include <string>
 #include <utility>
 #include <vector>
+
+#include <unistd.h>
 
 #include <cairn/core/random.hpp>
 #include <cairn/eval/association.hpp>
@@ -232,7 +235,7 @@ std::vector<cairn::PosePair> through_a_file(const cairn::Trajectory& path, const
       T = SE3(cairn::SO3::from_quaternion(q.z(), q.w(), q.x(), q.y()), T.translation());
   }
   const auto file =
-      std::filesystem::temp_directory_path() / ("12_visual_slam_" + std::to_string(lesson.seed()) + ".tum");
+      std::filesystem::temp_directory_path() / ("12_visual_slam_" + std::to_string(::getpid()) + ".tum");
   cairn::write_tum(file, written);
   cairn::Trajectory read = cairn::read_tum(file);
   lesson.file("path.tum", cairn::read_file(file));
@@ -333,12 +336,12 @@ int main(int argc, char** argv) {
     if (slam.store.is_base(id)) off_wall.push_back(room.distance_to_wall(slam.landmarks[id].mean));
   lesson.verdict("poses in the file", static_cast<double>(poses), static_cast<double>(lesson.steps()),
                  static_cast<double>(lesson.steps()));
-  lesson.verdict("ATE [m]", ate->translation.rmse, 0, 0.1);
-  lesson.verdict("RPE [m]", rpe->translation.rmse, 0, 0.04);
-  lesson.verdict("turn of a step [deg]", rpe->rotation.rmse * 180 / std::numbers::pi, 0, 1);
-  lesson.verdict("back at the start [m]", rows.back()[1], 0, 0.06);
+  lesson.verdict("ATE [m]", ate->translation.rmse, 0, 0.09);
+  lesson.verdict("RPE [m]", rpe->translation.rmse, 0, 0.02);
+  lesson.verdict("turn of a step [deg]", rpe->rotation.rmse * 180 / std::numbers::pi, 0, 0.4);
+  lesson.verdict("back at the start [m]", rows.back()[1], 0, 0.12);
   lesson.verdict("links that agree, right", right_inliers / inliers, 0.97, 1);
-  lesson.verdict("landmarks off the walls [m]", cairn::median(off_wall), 0, 0.06);
+  lesson.verdict("landmarks off the walls [m]", cairn::median(off_wall), 0, 0.04);
 
   example::Cloud cloud{
       .title = "Path and landmarks in space",
@@ -377,4 +380,6 @@ int main(int argc, char** argv) {
   lesson.csv("pictures", {"picture", "error_m", "two_sigma_m", "links", "agree", "landmarks"}, rows);
   return lesson.finish();
 }
-// ANSWERS
+// ANSWERS  1. All of it, with the steps: ATE from 0.045 to 0.080 m, and 0.084 m at the start in place of
+// 0.008.
+// 2. 0.073 m: what it had gathered on the way. 3. One in seven; the pose has plenty left, its ATE is 0.043 m.
