@@ -45,6 +45,20 @@ setTimeout(async () => {
 }, 500);
 </script>)";
 
+// Presses every button that saves a figure, and catches the files instead of saving them.
+const char* const saver = R"(
+<script>
+setTimeout(async () => {
+  const files = [];
+  HTMLAnchorElement.prototype.click = function () { files.push(fetch(this.href).then((answer) => answer.blob())); };
+  const buttons = [...document.querySelectorAll('button.save')];
+  for (const button of buttons) button.click();
+  await new Promise((done) => setTimeout(done, 1500));
+  const saved = (await Promise.all(files)).filter((file) => file.type === 'image/png' && file.size > 1000);
+  document.documentElement.dataset.saved = `${saved.length} of ${buttons.length} saved`;
+}, 1500);
+</script>)";
+
 bool can_open() {
   if (!example::has_report_page())
     MESSAGE("skipped: built without the page (npm)");
@@ -111,11 +125,13 @@ TEST_CASE("report page: films, heat maps, bands, dots and areas are drawn, gaps 
     film.frames.push_back({at, "frame", {example::ellipse("area", Ink::belief, {at, 0}, {1, 0.5, 1})}});
   film.frames.push_back({2, "nothing here", {}});
   report.add(film);
+  report.add(example::Cloud{.title = "cloud", .points = {{0, 0, 0}, {1, 1, 1}}});
   const cairn_test::Folder folder;
-  cairn::write_file_atomically(folder / "page.html", report.html().value() + mover);
+  cairn::write_file_atomically(folder / "page.html", report.html().value() + mover + saver);
   const OpenedPage opened = cairn_test::open_page(folder, folder / "page.html");
   CHECK(opened.console == "");
-  CHECK(opened.has("data-panels=\"4\""));
+  CHECK(opened.has("data-panels=\"5\""));
+  CHECK(opened.has("data-saved=\"5 of 5 saved\""));
   CHECK(opened.count("class=\"heat\"") == 2);
   CHECK(opened.count("type=\"range\"") == 1);
   check_sliders_move(opened);

@@ -1,6 +1,6 @@
 // Points and lines in space with three, z up. Drawn when something changes, not all the time.
 import {
-  BufferAttribute, BufferGeometry, Color, GridHelper, PerspectiveCamera, Points, PointsMaterial, Scene, Vector3, WebGLRenderer,
+  BufferAttribute, BufferGeometry, Color, GridHelper, PerspectiveCamera, Points, PointsMaterial, Scene, TOUCH, Vector3, WebGLRenderer,
 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 import { Line2 } from 'three/addons/lines/Line2.js';
@@ -112,6 +112,10 @@ class View {
     canvas.addEventListener('pointerdown', () => (this.controls.enableZoom = true));
     canvas.addEventListener('pointerleave', () => (this.controls.enableZoom = false));
     this.controls.addEventListener('change', () => this.draw());
+    // One finger scrolls the page, two turn and zoom.
+    this.controls.touches = { ONE: null, TWO: TOUCH.DOLLY_ROTATE };
+    canvas.style.touchAction = 'pan-y';
+    canvas.addEventListener('beforesave', () => this.drawNow());
   }
 
   /** From the direction (x, y, z), everything in view. */
@@ -152,8 +156,12 @@ class View {
     this.pending = true;
     requestAnimationFrame(() => {
       this.pending = false;
-      this.renderer.render(this.scene, this.camera);
+      this.drawNow();
     });
+  }
+
+  drawNow() {
+    this.renderer.render(this.scene, this.camera);
   }
 }
 

@@ -5,6 +5,7 @@ import { heat } from './heat.js';
 import { film, plane } from './plane.js';
 import { picture, table } from './plain.js';
 import { lines } from './plots.js';
+import { saveButton } from './save.js';
 import { startTheme, toggleTheme } from './theme.js';
 
 const kinds = {
@@ -51,6 +52,8 @@ function show(panel, grid) {
     return;
   }
   kind.draw(panel, body);
+  const save = saveButton(panel, body);
+  if (save) card.prepend(save);
 }
 
 startTheme();
