@@ -330,6 +330,20 @@ TEST_SUITE("slam/landmark_map") {
     CHECK(std::abs(weights.mean() - 1) < 5 * weights.standard_deviation() / std::sqrt(20000.0) + 1e-12);
   }
 
+  TEST_CASE("landmark_map: a landmark that has moved is one candidate, not one for each of its places") {
+    Random random(1);
+    Map map({}, {.pick = Pick::drawn, .gate = 0.999});
+    map.insert(Plane::Zero(), {{Plane(1, 1), 0}}, {new_landmark});
+    map.insert(Plane::Zero(), {{Plane(2.5, 1), 0}}, {0});
+    const Map::Observation z{{Plane(1.7, 1), {}}};
+    double sum = 0;
+    Association n;
+    enumerate(map, Plane::Zero(), z, chi_square_quantile(0.999, 2), n, 0,
+              [&](const Association&, double l) { sum += std::exp(l); });
+    const auto chosen = map.choose(Plane::Zero(), z, random);
+    CHECK(std::exp(chosen.log_likelihood - chosen.log_probability) == doctest::Approx(sum).epsilon(1e-12));
+  }
+
   TEST_CASE("landmark_map: of many landmarks a sighting finds the likeliest, as looking at all does") {
     const auto seed = cairn_test::seed();
     CAPTURE(seed);
