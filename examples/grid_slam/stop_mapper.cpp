@@ -38,6 +38,15 @@ struct StopMap {
     return grid.log_likelihood(z, x);
   }
   void insert(const Pose& x, const Observation& z) { grid.insert(z, x); }
+
+  /// For many draws from near one pose.
+  struct Prepared {
+    typename cairn::StopGrid<Storage>::Prepared grid;
+    [[nodiscard]] double log_likelihood(const Pose& x, const Observation& z) {
+      return grid.log_likelihood(z, x);
+    }
+  };
+  [[nodiscard]] Prepared prepared() const { return {grid.prepared()}; }
 };
 
 using OnTiles = StopMap<cairn::SharedTiles<StopCell>>;

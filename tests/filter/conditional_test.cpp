@@ -31,6 +31,12 @@ struct Memory {
   void insert(const Pose& x, const Observation& z) { inserted.emplace_back(x(0), z); }
 };
 
+/// The same, where what is asked has to be made ready first.
+struct Preparing : Memory {
+  [[nodiscard]] const Memory& prepared() const { return *this; }
+  [[nodiscard]] double log_likelihood(const Pose&, const Observation&) const { return NAN; }
+};
+
 constexpr double motion_variance = 0.3;
 Gaussian<Line> moved(const Line& x) {
   return {Line(x(0) + 1), Matrix<1>(motion_variance)};
@@ -134,6 +140,17 @@ TEST_SUITE("filter/conditional") {
       REQUIRE(path.back().pose(0) == belief[i].pose(0));
     }
     CHECK(belief.stored_poses() < 26 + 40 * 10);  // the past is shared
+  }
+
+  TEST_CASE("conditional: a map that makes ready is asked through what it has prepared") {
+    const ConditionalFilter filter{.seed = 3};
+    MappedPaths<Memory> plain(Line(0.0), Memory{}, 20);
+    MappedPaths<Preparing> preparing(Line(0.0), Preparing{}, 20);
+    for (const double z : {1.1, 1.9, 3.2}) {
+      REQUIRE(filter.step(plain, motion, FromMotion{.draws = 5}, z).accepted());
+      REQUIRE(filter.step(preparing, motion, FromMotion{.draws = 5}, z).accepted());
+    }
+    for (std::size_t i = 0; i < plain.size(); ++i) REQUIRE(plain[i].pose == preparing[i].pose);
   }
 
   TEST_CASE("conditional: the same bytes for 1, 2 and 7 threads") {

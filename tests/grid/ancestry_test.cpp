@@ -65,15 +65,19 @@ TEST_SUITE("grid/ancestry") {
       return CellAddress{static_cast<std::int32_t>(random.below(90)) - 45 + step / 3,
                          static_cast<std::int32_t>(random.below(60)) - 30};
     };
+    const auto write_some = [&](int count, int step, auto& tree, auto& tile, auto& map) {
+      auto to_tree = tree.writer();
+      auto to_tile = tile.writer();
+      for (int k = 0; k < count; ++k) {
+        const CellAddress cell = somewhere(step);
+        const Cell value = drawn<Cell>(random);
+        (step % 2 == 0 ? tree.write(cell) : to_tree(cell)) = value;
+        (step % 2 == 0 ? tile.write(cell) : to_tile(cell)) = value;
+        map[cell] = value;
+      }
+    };
     for (int step = 0; step < 300; ++step) {
-      for (std::size_t i = 0; i < particles; ++i)
-        for (int k = 0; k < 20; ++k) {
-          const CellAddress cell = somewhere(step);
-          const Cell value = drawn<Cell>(random);
-          trees[i].write(cell) = value;
-          tiles[i].write(cell) = value;
-          plain[i][cell] = value;
-        }
+      for (std::size_t i = 0; i < particles; ++i) write_some(20, step, trees[i], tiles[i], plain[i]);
       if (step % 5 == 4)  // some die, and others take their places
         for (int death = 0; death < 4; ++death) {
           const std::size_t from = random.below(particles), to = random.below(particles);
@@ -83,9 +87,16 @@ TEST_SUITE("grid/ancestry") {
         }
       for (int look = 0; look < 20; ++look) {
         const std::size_t i = random.below(particles);
-        const CellAddress cell = somewhere(step);
-        const auto known = plain[i].find(cell);
-        REQUIRE(trees[i].read(cell) == (known == plain[i].end() ? Cell{} : known->second));
+        auto from_tree = trees[i].reader();
+        auto from_tile = tiles[i].reader();
+        for (int cells = 0; cells < 3; ++cells) {
+          const CellAddress cell = somewhere(step);
+          const auto known = plain[i].find(cell);
+          const Cell value = known == plain[i].end() ? Cell{} : known->second;
+          REQUIRE(trees[i].read(cell) == value);
+          REQUIRE(from_tree(cell) == value);
+          REQUIRE(from_tile(cell) == value);
+        }
       }
       REQUIRE(trees[0].nodes() <= 2 * particles - 1);
       REQUIRE(trees[0].consistent());

@@ -59,6 +59,23 @@ TEST_SUITE("io/carmen") {
     CHECK(log.odometry[0].T_odom_robot.y() == 2);
   }
 
+  TEST_CASE("carmen: DP-SLAM's log is steps of odometry and laser, and its readings end at 8 m") {
+    const CarmenLog log =
+        read("Odometry 1 2 0.5 \nLaser 3 1.5 8.183 0.5 \nOdometry 2 2 0.5\nLaser 3 1 2 3\n");
+    REQUIRE(log.scans.size() == 2);
+    const StampedScan& a = log.scans[0];
+    CHECK(a.time == 0);
+    CHECK(log.scans[1].time == 1);
+    CHECK(a.T_odom_laser.x() == 1);
+    CHECK(a.T_odom_robot.angle() == 0.5);
+    CHECK(a.scan.kind(0) == BeamKind::hit);
+    CHECK(a.scan.kind(1) == BeamKind::no_return);
+    CHECK(a.scan.angle(2) == doctest::Approx(std::numbers::pi / 2));
+    CHECK(words_of("Laser 1 1\n").find("expected a line Odometry before") != std::string::npos);
+    CHECK(words_of("Odometry 1 2 3\nLaser 1 1\nLaser 1 1\n").find("log:3: ") != std::string::npos);
+    CHECK(words_of("Odometry 1 2\n").find("the odometry: a finite number") != std::string::npos);
+  }
+
   TEST_CASE("carmen: the order is the file's, also where times run back") {
     const std::string early = "FLASER 1 1 0 0 0 0 0 0 5 host 0\n", late = "FLASER 1 1 0 0 0 0 0 0 6 host 0\n";
     const CarmenLog log = read(late + early + late);
@@ -68,7 +85,8 @@ TEST_SUITE("io/carmen") {
 
   TEST_CASE("carmen: bad lines are refused with the line and what was expected") {
     CHECK(words_of("").find("none") != std::string::npos);
-    CHECK(words_of(wheels).find("expected lines FLASER or ROBOTLASER1, found none") != std::string::npos);
+    CHECK(words_of(wheels).find("expected lines FLASER, ROBOTLASER1 or Laser, found none") !=
+          std::string::npos);
     CHECK(words_of("FLASER 3 1 2\n").find("log:1: expected a range: a finite number (the line ends") !=
           std::string::npos);
     CHECK(words_of(std::string(front) + "FLASER 2 1 nan 0 0 0 0 0 0 1 h 0\n").find("log:2: ") !=

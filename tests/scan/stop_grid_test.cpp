@@ -128,6 +128,30 @@ TEST_SUITE("scan/stop_grid") {
     CHECK(sum == doctest::Approx(1).epsilon(0.02));  // noise carries a little below the nearest range
   }
 
+  TEST_CASE("stop_grid: what is prepared answers as the grid does, and as the sum over the cells of a beam") {
+    const std::uint64_t seed = cairn_test::seed(8);
+    CAPTURE(seed);
+    Random random(seed);
+    const StopOptions options{.independence = 1};
+    const StopGrid<> grid = random_grid(random, options);
+    auto prepared = grid.prepared();
+    for (int trial = 0; trial < 200; ++trial) {
+      const double range = random.uniform(0.1, 9);
+      const SE2 pose(random.uniform(-1, 1), random.uniform(-1, 1), random.uniform(-3, 3));
+      const double found = grid.log_likelihood(beam(range), pose);
+      REQUIRE(prepared.log_likelihood(beam(range), pose) == found);
+      double likelihood = 0;
+      const double end = range < 8 ? static_cast<double>(static_cast<float>(range)) + 3 * options.sigma : 8.0;
+      const double reach =
+          grid.along_beam(pose.x(), pose.y(), pose.angle(), end, [&](double at, double stopped) {
+            const double z = (static_cast<double>(static_cast<float>(range)) - at) / options.sigma;
+            likelihood += stopped * 0.3989422804014327 / options.sigma * std::exp(-0.5 * z * z);
+          });
+      const double expected = range < 8 ? 0.95 * likelihood + 0.025 / 8 : 0.95 * reach + 0.025;
+      REQUIRE(found == doctest::Approx(std::log(expected)).epsilon(0.01));  // what is 4 sigma off is left out
+    }
+  }
+
   TEST_CASE("stop_grid: over the tree of ancestors it is the same, bit for bit, through copies and deaths") {
     const std::uint64_t seed = cairn_test::seed(6);
     CAPTURE(seed);

@@ -79,6 +79,14 @@ concept ChoosingMap =
       m.insert(x, z, c);
     };
 
+/// A map that can make ready for being asked at several poses: prepared() has the map's log_likelihood, and
+/// lives until a map is changed.
+template <class M>
+concept PreparingMap =
+    ConditionalMap<M> && requires(const M& m, const typename M::Pose& x, const typename M::Observation& z) {
+      { m.prepared().log_likelihood(x, z) } -> std::convertible_to<double>;
+    };
+
 /// A choice c that was made with probability q(c).
 template <class C>
 struct Chosen {
@@ -143,22 +151,12 @@ struct FromMotion {
   [[nodiscard]] ProposedOf<M> operator()(const M& map, const Gaussian<typename M::Pose>& motion,
                                          const typename M::Observation& z, Random& random) const {
     CAIRN_EXPECTS(draws > 0, "FromMotion needs at least one draw");
-    if (draws == 1) return draw(map, motion, z, random);
-    std::vector<ProposedOf<M>> drawn;
-    std::vector<double> log_weights;
-    for (std::size_t k = 0; k < draws; ++k) {
-      drawn.push_back(draw(map, motion, z, random));
-      log_weights.push_back(drawn.back().log_weight);
+    if constexpr (PreparingMap<M> && !ChoosingMap<M>) {
+      auto prepared = map.prepared();
+      return best_of<M>(prepared, motion, z, random);
+    } else {
+      return best_of<M>(map, motion, z, random);
     }
-    const double total = log_sum_exp(log_weights);
-    std::size_t chosen = 0;
-    for (double left = random.uniform(); chosen + 1 < draws; ++chosen) {
-      const double share = std::exp(log_weights[chosen] - total);
-      if (!(left >= share)) break;  // also where no draw has a likelihood
-      left -= share;
-    }
-    drawn[chosen].log_weight = total - std::log(static_cast<double>(draws));
-    return std::move(drawn[chosen]);
   }
   /// The regime is drawn by its share first.
   template <ConditionalMap M>
@@ -175,8 +173,30 @@ struct FromMotion {
   }
 
 private:
+  /// `map` is one, or what one has prepared.
   template <ConditionalMap M>
-  [[nodiscard]] static ProposedOf<M> draw(const M& map, const Gaussian<typename M::Pose>& motion,
+  [[nodiscard]] ProposedOf<M> best_of(auto& map, const Gaussian<typename M::Pose>& motion,
+                                      const typename M::Observation& z, Random& random) const {
+    if (draws == 1) return draw<M>(map, motion, z, random);
+    std::vector<ProposedOf<M>> drawn;
+    std::vector<double> log_weights;
+    for (std::size_t k = 0; k < draws; ++k) {
+      drawn.push_back(draw<M>(map, motion, z, random));
+      log_weights.push_back(drawn.back().log_weight);
+    }
+    const double total = log_sum_exp(log_weights);
+    std::size_t chosen = 0;
+    for (double left = random.uniform(); chosen + 1 < draws; ++chosen) {
+      const double share = std::exp(log_weights[chosen] - total);
+      if (!(left >= share)) break;  // also where no draw has a likelihood
+      left -= share;
+    }
+    drawn[chosen].log_weight = total - std::log(static_cast<double>(draws));
+    return std::move(drawn[chosen]);
+  }
+
+  template <ConditionalMap M>
+  [[nodiscard]] static ProposedOf<M> draw(auto& map, const Gaussian<typename M::Pose>& motion,
                                           const typename M::Observation& z, Random& random) {
     typename M::Pose pose = sample(motion, random);
     if constexpr (ChoosingMap<M>) {

@@ -34,6 +34,18 @@ namespace cairn { inline namespace CAIRN_ABI {
 
 template <class Cell>
 class Ancestry {
+  /// Where each cell's value was found, or null: a page for each tile met.
+  template <class Value>
+  class Scratch {
+  public:
+    [[nodiscard]] Value*& operator()(CellAddress cell) { return write_(cell); }
+
+  private:
+    // On the heap, so that moving this leaves the writer's grid where it is.
+    std::unique_ptr<SharedTiles<Value*>> known_ = std::make_unique<SharedTiles<Value*>>();
+    typename SharedTiles<Value*>::Writer write_{*known_};
+  };
+
 public:
   using Tile = std::array<Cell, tile_cells>;
 
@@ -60,6 +72,40 @@ public:
     node_ = tree_->own(node_);
     return tree_->write(node_, cell);
   }
+
+  /// Reads many cells many times: each is looked up in the tree once. Lives no longer than the grid, and only
+  /// until any grid of the tree is written, copied or destroyed.
+  class Reader {
+  public:
+    explicit Reader(const Ancestry& grid) : grid_(&grid) {}
+    [[nodiscard]] const Cell& operator()(CellAddress cell) {
+      const Cell*& known = found_(cell);
+      if (known == nullptr) known = &grid_->read(cell);
+      return *known;
+    }
+
+  private:
+    const Ancestry* grid_;
+    Scratch<const Cell> found_;
+  };
+  [[nodiscard]] Reader reader() const { return Reader(*this); }
+
+  /// Writes many cells many times: each is looked up in the tree once. No grid of the tree may be read,
+  /// written, copied or destroyed otherwise meanwhile.
+  class Writer {
+  public:
+    explicit Writer(Ancestry& grid) : grid_(&grid) {}
+    [[nodiscard]] Cell& operator()(CellAddress cell) {
+      Cell*& known = own_(cell);
+      if (known == nullptr) known = &grid_->write(cell);
+      return *known;
+    }
+
+  private:
+    Ancestry* grid_;
+    Scratch<Cell> own_;
+  };
+  [[nodiscard]] Writer writer() { return Writer(*this); }
 
   /// Calls visit(address, tile) with a copy of every tile of which this grid has a cell, by columns, then
   /// rows.

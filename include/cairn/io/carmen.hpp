@@ -2,15 +2,18 @@
 // SPDX-License-Identifier: MIT
 //
 /// @file
-/// Logs of CARMEN, in which the field's laser data sets are kept: FLASER, ROBOTLASER1 and ODOM lines.
+/// Logs of CARMEN, in which the field's laser data sets are kept: FLASER, ROBOTLASER1 and ODOM lines; and
+/// those of DP-SLAM, of which a line Odometry and a line Laser are one step.
 ///
 ///   FLASER n r_1..r_n  laser x y theta  robot x y theta  time host logger_time
 ///   ROBOTLASER1 type first_angle field_of_view step farthest accuracy mode  n r_1..r_n  m e_1..e_m
 ///               laser x y theta  robot x y theta  tv rv forward side turn  time host logger_time
 ///   ODOM x y theta tv rv acceleration  time host logger_time
-/// (CARMEN robot navigation toolkit, manual, "log file format".) Metres, radians, seconds. Other lines
-/// (PARAM, SYNC, comments, ...) are of no concern. The order of the file is the order of events, also where
-/// times run back, as in published logs: nothing is sorted.
+///   Odometry x y theta
+///   Laser n r_1..r_n
+/// (CARMEN robot navigation toolkit, manual, "log file format"; DP-SLAM 0.1.1, OpenSLAM.) Metres, radians,
+/// seconds. Other lines (PARAM, SYNC, comments, ...) are of no concern. The order of the file is the order of
+/// events, also where times run back, as in published logs: nothing is sorted.
 #pragma once
 
 #include <algorithm>
@@ -18,6 +21,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -157,6 +161,20 @@ inline StampedOdometry odometry(CarmenFields fields) {
   return o;
 }
 
+/// DP-SLAM's logs have no times: a scan's is its number. The scanner is taken to be where odometry is. Its
+/// readings are millimetres in 13 bits, of which those above 8 m say what went wrong instead of how far.
+inline StampedScan dp_slam_laser(CarmenFields fields, const TextLines& lines,
+                                 const std::optional<StampedOdometry>& at, double farthest) {
+  if (!at) lines.fail("a line Odometry before a line Laser");
+  StampedScan s;
+  s.time = at->time;
+  s.T_odom_laser = s.T_odom_robot = at->T_odom_robot;
+  s.scan.farthest = std::min(farthest, 8.0);
+  fields.ranges(s.scan.range, fields.count("the number of ranges"));
+  set_half_turn(s.scan);
+  return s;
+}
+
 }  // namespace detail
 
 /// The scans and the odometry of a CARMEN log; ranges from `farthest` [m] on are no return. Throws Error
@@ -165,6 +183,7 @@ inline StampedOdometry odometry(CarmenFields fields) {
   if (!(farthest > 0)) raise("read_carmen: expected a largest range above zero");
   TextLines lines(path, "a CARMEN log");
   CarmenLog log;
+  std::optional<StampedOdometry> dp_slam;  // what a line Laser goes with
   while (lines.next()) {
     const std::string_view line = lines.line();
     const std::string_view kind = line.substr(0, line.find_first_of(" \t"));
@@ -174,8 +193,13 @@ inline StampedOdometry odometry(CarmenFields fields) {
       log.scans.push_back(detail::robot_laser(detail::CarmenFields(lines), farthest));
     else if (kind == "ODOM")
       log.odometry.push_back(detail::odometry(detail::CarmenFields(lines)));
+    else if (kind == "Odometry")
+      dp_slam = {static_cast<double>(log.scans.size()), detail::CarmenFields(lines).pose("the odometry")};
+    else if (kind == "Laser")
+      log.scans.push_back(
+          detail::dp_slam_laser(detail::CarmenFields(lines), lines, std::exchange(dp_slam, {}), farthest));
   }
-  if (log.scans.empty()) raise(path.string() + ": expected lines FLASER or ROBOTLASER1, found none");
+  if (log.scans.empty()) raise(path.string() + ": expected lines FLASER, ROBOTLASER1 or Laser, found none");
   return log;
 }
 

@@ -88,33 +88,66 @@ public:
     return reach;
   }
 
+  /// What log_likelihood() asks of the grid at many poses near each other: what was read once is kept. Lives
+  /// no longer than the grid, and only until it or one that it shares a tree with is changed.
+  class Prepared {
+  public:
+    explicit Prepared(const StopGrid& grid) : grid_(&grid), read_(grid.cells_.reader()) {}
+
+    /// As StopGrid's.
+    [[nodiscard]] double log_likelihood(const LaserScan& scan, const SE2& pose) {
+      const StopOptions& options = grid_->options_;
+      double sum = 0;
+      for (std::size_t i = 0; i < scan.size(); i += options.every) {
+        const BeamKind kind = scan.kind(i);
+        if (kind == BeamKind::invalid) continue;
+        const double angle = pose.angle() + scan.angle(i), half = 0.5 * options.outliers;
+        sum += kind == BeamKind::no_return
+                   ? std::log((1 - options.outliers) * reach(pose, angle, scan.farthest) + half)
+                   : std::log((1 - options.outliers) * density(pose, angle, scan.range[i]) +
+                              half / scan.farthest);
+      }
+      return options.independence * sum;
+    }
+
+  private:
+    /// The probability that a beam comes to `end`.
+    [[nodiscard]] double reach(const SE2& from, double angle, double end) {
+      double stops = 0;  // expected, so far: only their sum counts, and one exponential serves all cells
+      grid_->walk(from.x(), from.y(), angle, end, [&](CellAddress cell, double, double chord) {
+        stops += grid_->stops_per_metre(read_(cell)) * chord;
+      });
+      return std::exp(-stops);
+    }
+    /// The density [1/m] of a reading `range` of a beam that nothing disturbs.
+    [[nodiscard]] double density(const SE2& from, double angle, double range) {
+      const double sigma = grid_->options_.sigma;
+      const double norm = 1 / (sigma * std::sqrt(2 * std::numbers::pi));
+      double stops = 0, sum = 0;
+      grid_->walk(from.x(), from.y(), angle, range + 3 * sigma,
+                  [&](CellAddress cell, double before, double chord) {
+                    const double here = grid_->stops_per_metre(read_(cell)) * chord;
+                    if (const double z = (range - (before + 0.5 * chord)) / sigma; std::abs(z) < 4)
+                      sum -= std::exp(-stops - 0.5 * z * z) * std::expm1(-here);
+                    stops += here;
+                  });
+      return norm * sum;
+    }
+
+    const StopGrid* grid_;
+    typename Storage::Reader read_;
+  };
+  [[nodiscard]] Prepared prepared() const { return Prepared(*this); }
+
   /// log density [1/m] of the scan's ranges, or probability where nothing came back, times the independence.
   [[nodiscard]] double log_likelihood(const LaserScan& scan, const SE2& pose) const {
-    double sum = 0;
-    for (std::size_t i = 0; i < scan.size(); i += options_.every) {
-      const BeamKind kind = scan.kind(i);
-      if (kind == BeamKind::invalid) continue;
-      const double angle = pose.angle() + scan.angle(i), half = 0.5 * options_.outliers;
-      if (kind == BeamKind::no_return) {
-        const double reach = along_beam(pose.x(), pose.y(), angle, scan.farthest, [](double, double) {});
-        sum += std::log((1 - options_.outliers) * reach + half);
-        continue;
-      }
-      const auto range = static_cast<double>(scan.range[i]);
-      const double norm = 1 / (options_.sigma * std::sqrt(2 * std::numbers::pi));
-      double density = 0;
-      along_beam(pose.x(), pose.y(), angle, range + 3 * options_.sigma, [&](double at, double stopped) {
-        const double z = (range - at) / options_.sigma;
-        if (std::abs(z) < 4) density += stopped * norm * std::exp(-0.5 * z * z);
-      });
-      sum += std::log((1 - options_.outliers) * density + half / scan.farthest);
-    }
-    return options_.independence * sum;
+    return prepared().log_likelihood(scan, pose);
   }
 
   /// Takes a scan in: a stop in each hit's cell, and the lengths of all beams.
   void insert(const LaserScan& scan, const SE2& pose) {
     [[maybe_unused]] const auto guard = guarded();
+    auto write = cells_.writer();
     for (std::size_t i = 0; i < scan.size(); ++i) {
       const BeamKind kind = scan.kind(i);
       if (kind == BeamKind::invalid) continue;
@@ -123,10 +156,10 @@ public:
       CellAddress last;
       walk(pose.x(), pose.y(), pose.angle() + scan.angle(i), end,
            [&](CellAddress cell, double, double chord) {
-             cells_.write(cell).length += static_cast<float>(chord);
+             write(cell).length += static_cast<float>(chord);
              last = cell;
            });
-      if (hit) cells_.write(last).stops += 1;
+      if (hit) write(last).stops += 1;
     }
   }
 
