@@ -25,6 +25,7 @@
 
 #include "floor_plan.hpp"
 #include "run.hpp"
+#include "stop_mapper.hpp"
 #include "support/data.hpp"
 #include "support/scoreboard.hpp"
 
@@ -119,6 +120,60 @@ void add_rows(Scoreboard& board, const Figures& f, const std::optional<std::file
       row("resident memory, 30 particles", "MB", 85, 35, [](const Runs& r) { return r.megabytes.front(); }));
 }
 
+/// DP-SLAM on its own log, by its tree and by tiles, and its map on ACES with scans matched.
+void add_stop_rows(Scoreboard& board) {
+  Row step{.name = "DP-SLAM's log: a step, 50 particles, 500 draws, tree of ancestors",
+           .unit = "s",
+           .must = 0.12,
+           .aim = 0.03,
+           .rival = 0.24,
+           .rival_name = "DP-SLAM 0.1.1"};
+  Row equal{
+      .name = "the same on tiles: poses that differ", .unit = "poses", .must = 0, .rival_name = "no rival"};
+  if (const auto folder = cairn_test::real_data("dp_slam")) {
+    const cairn::CarmenLog log = cairn::read_carmen(*folder / "loop5.log");
+    const auto by = [&](grid_slam::StopStorage storage) {
+      return grid_slam::run_stop_mapper(log, {.storage = storage}, {});
+    };
+    const Results tree = by(grid_slam::StopStorage::ancestry), tiles = by(grid_slam::StopStorage::tiles);
+    const auto per_step = [](const Results& r) {
+      return r.cpu_seconds / static_cast<double>(r.steps.size());
+    };
+    step.measured = per_step(tree);
+    step.note = "on tiles " + std::to_string(per_step(tiles)) + " s";
+    std::size_t differing = 0;
+    for (std::size_t i = 0; i < tree.drawn.size(); ++i)
+      differing += tree.drawn[i].pose == tiles.drawn[i].pose ? 0 : 1;
+    equal.measured = static_cast<double>(differing);
+  } else {
+    step.note = equal.note = "no data";
+  }
+  board.add(step);
+  board.add(equal);
+  Row aces{.name = "ACES by DP-SLAM's map, scans matched: mean of relations, median of 5 seeds",
+           .unit = "m",
+           .must = 0.055,
+           .aim = 0.045,
+           .rival_name = "no rival"};
+  const auto folder = cairn_test::real_data("laser_2d");
+  if (const auto log = folder ? unpacked(*folder / "aces.clf.bz2") : std::nullopt) {
+    const auto relations = cairn::read_relations(*folder / "aces.relations");
+    std::vector<double> means;
+    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+      grid_slam::StopMapperOptions options = grid_slam::matching_stops();
+      options.storage = grid_slam::StopStorage::tiles;
+      options.seed = seed;
+      options.threads = std::max(1U, std::thread::hardware_concurrency());
+      means.push_back(grid_slam::run_stop_mapper(*log, options, relations).of_means->mean);
+    }
+    aces.measured = median(means);
+    aces.note = "worst " + std::to_string(worst(means)) + " m";
+  } else {
+    aces.note = "no data";
+  }
+  board.add(aces);
+}
+
 void add_rendered_row(Scoreboard& board) {
   const grid_slam::Drive drive = grid_slam::simulated_drive({});
   const Results r = grid_slam::run(drive.log, {}, grid_slam::true_relations(drive));
@@ -141,6 +196,7 @@ int main(int argc, char** argv) {
   add_rows(board, {"intel", "Intel", 0.023, 0.80, 0.018, 0.53, 0.0184, "open_karto; GMapping 0.0239"},
            folder);
   add_rows(board, {"fr079", "FR079", 0.055, 0.95, 0.048, {}, 0.0554, "GMapping tuned to it"}, folder);
+  add_stop_rows(board);
   add_rendered_row(board);
   return board.finish();
 }

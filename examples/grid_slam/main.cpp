@@ -36,6 +36,7 @@ enum class Maps { tiles, ancestry, stop };
 
 struct Options {
   Maps map = Maps::tiles;
+  StopProposal proposal = StopProposal::motion;
   std::string log, relations;
   bool simulate = false;
   std::filesystem::path out = "grid_slam_out";
@@ -104,7 +105,7 @@ std::function<std::optional<std::string>()> watched(example::Progress& progress)
 }
 
 Results map_stops(const Options& options, const Input& input) {
-  StopMapperOptions made;
+  StopMapperOptions made = options.proposal == StopProposal::match ? matching_stops() : StopMapperOptions{};
   made.storage = options.map == Maps::ancestry ? StopStorage::ancestry : StopStorage::tiles;
   made.particles = options.particles.value_or(made.particles);
   made.seed = options.seed.value_or(made.seed);
@@ -143,13 +144,18 @@ int main(int argc, char** argv) {
   const std::string name = "grid_slam";
   Options options;
   CLI::App app{"Maps a floor from laser scans and odometry: a particle filter over occupancy grids."};
-  auto* log = app.add_option("--log", options.log, "a CARMEN log: FLASER or ROBOTLASER1 lines");
+  auto* log =
+      app.add_option("--log", options.log, "a CARMEN log (FLASER or ROBOTLASER1 lines) or one of DP-SLAM");
   app.add_flag("--simulate", options.simulate, "a rendered drive around a corridor, also without --log")
       ->excludes(log);
   app.add_option("--map", options.map,
                  "tiles: occupancy, scans matched; stop, ancestry: DP-SLAM on shared tiles or on its tree")
       ->transform(CLI::CheckedTransformer(std::map<std::string, Maps>{
           {"tiles", Maps::tiles}, {"ancestry", Maps::ancestry}, {"stop", Maps::stop}}));
+  app.add_option("--proposal", options.proposal,
+                 "of --map stop and ancestry: poses drawn from odometry (motion), or where the scan matches")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, StopProposal>{
+          {"motion", StopProposal::motion}, {"match", StopProposal::match}}));
   app.add_option("--relations", options.relations,
                  "relations to measure the path by: t1 t2 x y z roll pitch yaw");
   app.add_option("--out", options.out, "folder for the map, the trajectory, the summary and the report");
@@ -176,6 +182,8 @@ int main(int argc, char** argv) {
   return example::exit_code_of(name, [&]() -> int {
     if (options.map != Maps::tiles && !(options.save.empty() && options.load.empty()))
       cairn::raise("--save and --load are for --map tiles");
+    if (options.map == Maps::tiles && app.count("--proposal") > 0)
+      cairn::raise("--proposal is for --map stop and --map ancestry");
     check_save(options.save);
     const Input input = input_of(options);
     std::optional<Mapper> mapper;

@@ -47,22 +47,72 @@ struct StopMap {
     }
   };
   [[nodiscard]] Prepared prepared() const { return {grid.prepared()}; }
+
+  // What a StopMapper asks of a map.
+  static StopMap empty(const StopMapperOptions& options) { return {cairn::StopGrid<Storage>(options.map)}; }
+  static Observation observed(const cairn::LaserScan& scan) { return scan; }
+  static cairn::FromMotion proposal(const StopMapperOptions& options) { return {.draws = options.draws}; }
+  [[nodiscard]] const auto& stops() const { return grid; }
 };
 
-using OnTiles = StopMap<cairn::SharedTiles<StopCell>>;
-using OnAncestry = StopMap<cairn::Ancestry<StopCell>>;
+/// The same, with occupancy beside it for the proposal to match scans to.
+template <class Storage>
+struct MatchedStopMap {
+  using Pose = SE2;
+  struct Observation {
+    cairn::LaserScan scan;
+    std::vector<cairn::ScanPoint> points;
+  };
+  StopMap<Storage> stop_map;
+  OccupancyMap occupancy;
 
-std::size_t bytes_of(const cairn::MappedPaths<OnTiles>& belief) {
-  std::set<const void*> seen;
-  std::size_t bytes = 0;
-  for (std::size_t i = 0; i < belief.size(); ++i)
-    belief[i].map.grid.cells().for_each_tile([&](cairn::TileAddress, const auto& tile) {
-      if (seen.insert(&tile).second) bytes += sizeof tile;
-    });
-  return bytes;
-}
-std::size_t bytes_of(const cairn::MappedPaths<OnAncestry>& belief) {
-  return belief[0].map.grid.cells().bytes();
+  [[nodiscard]] double log_likelihood(const Pose& x, const Observation& z) const {
+    return stop_map.log_likelihood(x, z.scan);
+  }
+  void insert(const Pose& x, const Observation& z) {
+    stop_map.insert(x, z.scan);
+    occupancy.insert(x, z.points);
+  }
+
+  /// Draws where the occupancy says, and weighs by the stops: the weight is exact for any density drawn from.
+  struct Match {
+    FromMatch match{};
+
+    [[nodiscard]] cairn::Proposed<SE2> operator()(const MatchedStopMap& map, const Gaussian<SE2>& motion,
+                                                  const Observation& z, cairn::Random& random) const {
+      const cairn::RegimeMotion<SE2> only{{{0, 1, motion}}};
+      cairn::Proposed<SE2> drawn = match(map.occupancy, only, z.points, random);
+      const double by_stops = map.log_likelihood(drawn.pose, z);
+      drawn.log_weight += by_stops - drawn.log_likelihood;
+      drawn.log_likelihood = by_stops;
+      return drawn;
+    }
+  };
+
+  static MatchedStopMap empty(const StopMapperOptions& options) {
+    const MapperOptions as{};
+    return {StopMap<Storage>::empty(options),
+            {cairn::OccupancyGrid({options.map.geometry, as.field_radius}), as.model}};
+  }
+  static Observation observed(const cairn::LaserScan& scan) { return {scan, cairn::scan_points(scan)}; }
+  static Match proposal(const StopMapperOptions&) { return {}; }
+  [[nodiscard]] const auto& stops() const { return stop_map.grid; }
+};
+
+/// Bytes of all particles' stops, what they share counted once.
+template <class Map>
+std::size_t bytes_of(const cairn::MappedPaths<Map>& belief) {
+  if constexpr (requires { belief[0].map.stops().cells().bytes(); }) {
+    return belief[0].map.stops().cells().bytes();
+  } else {
+    std::set<const void*> seen;
+    std::size_t bytes = 0;
+    for (std::size_t i = 0; i < belief.size(); ++i)
+      belief[i].map.stops().cells().for_each_tile([&](cairn::TileAddress, const auto& tile) {
+        if (seen.insert(&tile).second) bytes += sizeof tile;
+      });
+    return bytes;
+  }
 }
 
 template <class Map>
@@ -71,8 +121,7 @@ public:
   using Belief = cairn::MappedPaths<Map>;
 
   StopMapper(const SE2& start, const StopMapperOptions& options)
-      : options_(options),
-        belief_(start, Map{cairn::StopGrid<typename Storage<Map>::type>(options.map)}, options.particles) {}
+      : options_(options), belief_(start, Map::empty(options), options.particles) {}
 
   void add(const cairn::StampedScan& scan) {
     bool due = scans_.empty();
@@ -95,10 +144,15 @@ public:
     r.drawn = filled_path(
         scans_, steps_.size(), [&](std::size_t k) { return steps_[k].scan; },
         [&](std::size_t k) { return path[k + 1].pose; });
-    r.means = r.drawn;  // what the motion says alone is no estimate
-    r.rematched = r.drawn;
+    // The mean of what was drawn from is an estimate where that knew of the scan, and none where it did not.
+    r.means = options_.proposal == StopProposal::motion
+                  ? r.drawn
+                  : filled_path(
+                        scans_, steps_.size(), [&](std::size_t k) { return steps_[k].scan; },
+                        [&](std::size_t k) { return path[k + 1].drawn_from.mean; });
+    r.rematched = r.means;
     r.newest = belief_.pose();
-    const auto& grid = belief_[belief_.best()].map.grid;
+    const auto& grid = belief_[belief_.best()].map.stops();
     r.map = image_of(options_.map.geometry, grid.cells(), [&](const StopCell& cell) {
       constexpr double enough = 0.2;  // of the beams through a cell
       if (!(cell.length > 0)) return unknown_grey;
@@ -114,13 +168,6 @@ public:
   }
 
 private:
-  template <class M>
-  struct Storage;
-  template <class S>
-  struct Storage<StopMap<S>> {
-    using type = S;
-  };
-
   void process(const cairn::StampedScan& scan) {
     Matrix<3> noise = Vector<3>(1e-6, 1e-6, 1e-6).asDiagonal();
     if (!steps_.empty()) {
@@ -133,7 +180,7 @@ private:
         .resample_below = options_.resample_below, .seed = options_.seed, .threads = options_.threads};
     const auto motion = [&](const SE2& x, std::size_t) { return Gaussian<SE2>{x * moved_, noise}; };
     const cairn::MappingStep step =
-        filter.step(belief_, motion, cairn::FromMotion{.draws = options_.draws}, scan.scan);
+        filter.step(belief_, motion, Map::proposal(options_), Map::observed(scan.scan));
     const std::size_t index = scans_.size() - 1;
     if (!step.accepted())
       cairn::raise("grid_slam: scan " + std::to_string(index) + ": " + cairn::explain(step.status));
@@ -168,6 +215,18 @@ void map_log(Results& r, const cairn::CarmenLog& log, const StopMapperOptions& o
 
 }  // namespace
 
+StopMapperOptions matching_stops() {
+  const MapperOptions mapper{};
+  StopMapperOptions options;
+  options.proposal = StopProposal::match;
+  options.particles = mapper.particles;
+  options.map.independence = 0.4;
+  options.odometry = mapper.odometry;
+  options.step_distance = mapper.step_distance;
+  options.step_angle = mapper.step_angle;
+  return options;
+}
+
 Results run_stop_mapper(const cairn::CarmenLog& log, const StopMapperOptions& options,
                         const std::vector<cairn::PoseRelation>& relations, const OnScan& on_scan) {
   if (log.scans.empty()) cairn::raise("grid_slam: expected a log with a scan");
@@ -176,10 +235,16 @@ Results run_stop_mapper(const cairn::CarmenLog& log, const StopMapperOptions& op
   r.seed = options.seed;
   r.particles = options.particles;
   r.threads = options.threads;
+  const auto map_with = [&]<class Storage>() {
+    if (options.proposal == StopProposal::motion)
+      map_log<StopMap<Storage>>(r, log, options, on_scan);
+    else
+      map_log<MatchedStopMap<Storage>>(r, log, options, on_scan);
+  };
   if (options.storage == StopStorage::tiles)
-    map_log<OnTiles>(r, log, options, on_scan);
+    map_with.template operator()<cairn::SharedTiles<StopCell>>();
   else
-    map_log<OnAncestry>(r, log, options, on_scan);
+    map_with.template operator()<cairn::Ancestry<StopCell>>();
   measure(r, relations);
   return r;
 }

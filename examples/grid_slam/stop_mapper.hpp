@@ -5,8 +5,9 @@
 /// DP-SLAM: particles drawn from odometry, many of each, over maps of how much every cell stops; the maps as
 /// a tree of ancestors or as shared tiles, with the same result bit for bit.
 ///
-/// No matching and no loop closing: what closes a loop is a particle that came back right. (A. Eliazar,
-/// R. Parr, "DP-SLAM 2.0", ICRA 2004.)
+/// No loop closing: what closes a loop is a particle that came back right. (A. Eliazar, R. Parr, "DP-SLAM
+/// 2.0", ICRA 2004.) Poses may instead be drawn where the scan matches an occupancy grid kept beside the
+/// stops, and weighed by the stops: one draw a particle, at the cost of a second map.
 #pragma once
 
 #include <cstddef>
@@ -26,11 +27,13 @@
 namespace grid_slam {
 
 enum class StopStorage { tiles, ancestry };
+enum class StopProposal { motion, match };
 
 struct StopMapperOptions {
   StopStorage storage = StopStorage::ancestry;
   std::size_t particles = 50;
-  std::size_t draws = 10;  ///< of each particle, of which one is kept
+  StopProposal proposal = StopProposal::motion;
+  std::size_t draws = 10;  ///< of each particle from its motion, of which one is kept
   std::uint64_t seed = 1;
   unsigned threads = 1;
   cairn::StopOptions map{.every = 5};
@@ -44,6 +47,11 @@ struct StopMapperOptions {
   double step_angle = 0.15;    ///< [rad]
   double resample_below = 0.5;
 };
+
+/// Scans are matched as the grid mapper does it, so that its steps and odometry are the right ones. More of
+/// the beams' evidence counts than where poses are only drawn: ten draws of each particle would not survive
+/// it.
+[[nodiscard]] StopMapperOptions matching_stops();
 
 /// Maps the log; the rest as run(). Throws cairn::Error on options out of range.
 [[nodiscard]] Results run_stop_mapper(const cairn::CarmenLog& log, const StopMapperOptions& options,
