@@ -16,6 +16,7 @@
 #include <cairn/core/random.hpp>
 #include <cairn/core/sizes.hpp>
 #include <cairn/core/statistics.hpp>
+#include <cairn/core/symmetric_eigen.hpp>
 #include <cairn/eval/association.hpp>
 #include <cairn/eval/consistency.hpp>
 #include <cairn/eval/kitti_metric.hpp>

@@ -4,9 +4,8 @@
 /// @file
 /// The only door to Eigen: the vector and matrix names that every other header uses.
 ///
-/// Only Eigen/Core comes in here. A header that needs a decomposition of Eigen's includes it itself
-/// (field/patch_noise.hpp takes Eigen/Eigenvalues), so that the price of #include stays with those who use
-/// it; for symmetric matrices there is core/cholesky.hpp.
+/// Only Eigen/Core comes in here, and no header takes a decomposition of Eigen's, so that nobody pays for
+/// including them: for symmetric matrices there are core/cholesky.hpp and core/symmetric_eigen.hpp.
 #pragma once
 
 #include <Eigen/Core>

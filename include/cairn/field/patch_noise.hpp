@@ -15,14 +15,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <concepts>
 #include <cstddef>
 #include <cstring>
-
-#include <Eigen/Eigenvalues>
+#include <span>
+#include <vector>
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/core/symmetric_eigen.hpp>
 #include <cairn/field/patch.hpp>
 #include <cairn/simd/registers.hpp>
 #include <cairn/version.hpp>
@@ -82,16 +82,14 @@ public:
 
   /// White noise of `variance` and a map error of `map_variance` whose correlation over a distance d is
   /// exp(-alpha^2 d^2); scales are the distances between samples along and across track. O(N^3 + M^3) once.
-  /// A template so that only those who call it compile the eigenvectors.
-  template <std::same_as<double> Real = double>
-  PatchNoise(Real variance, const PatchShape& shape, double map_variance, double alpha, double scale_along,
+  PatchNoise(double variance, const PatchShape& shape, double map_variance, double alpha, double scale_along,
              double scale_across)
       : PatchNoise(variance) {
     CAIRN_EXPECTS(map_variance >= 0.0 && alpha > 0.0 && scale_along > 0.0 && scale_across > 0.0,
                   "a map error needs a variance of at least 0, a positive alpha and positive scales");
     if (map_variance == 0.0) return;
-    const Modes<Real> along(shape.along(), alpha * scale_along);
-    const Modes<Real> across(shape.across(), alpha * scale_across);
+    const Modes along(shape.along(), alpha * scale_along);
+    const Modes across(shape.across(), alpha * scale_across);
     const int n = along.above(negligible * variance / (map_variance * across.value(0)));
     const int m = across.above(negligible * variance / (map_variance * along.value(0)));
     along_.resize(n, shape.along());
@@ -132,32 +130,31 @@ private:
   static constexpr double negligible = 1e-5;  // modes with less of the white variance are left out
 
   /// Eigenvalues and eigenvectors of the K of (1) of a row of samples, largest first.
-  template <class Real>
   class Modes {
   public:
-    Modes(int count, double alpha) : count_(count) {
-      Matrix<dynamic, dynamic, Real> correlation(count, count);
+    Modes(int count, double alpha) : values_(size_of(count)), vectors_(size_of(count) * size_of(count)) {
+      std::vector<double> correlation;
+      correlation.reserve(vectors_.size());
       for (int j = 0; j < count; ++j)
         for (int i = 0; i < count; ++i) {
           const double d = alpha * static_cast<double>(i - j);
-          correlation(i, j) = std::exp(-d * d);
+          correlation.push_back(std::exp(-d * d));
         }
-      solver_.compute(correlation);
+      CAIRN_EXPECTS(symmetric_eigen(std::span(correlation), std::span(values_), std::span(vectors_)),
+                    "a map error needs finite alpha and scales");
     }
-    [[nodiscard]] double value(int k) const { return solver_.eigenvalues()(count_ - 1 - k); }
-    [[nodiscard]] const double* vector(int k) const {
-      return solver_.eigenvectors().data() + (count_ - 1 - k) * count_;
-    }
+    [[nodiscard]] double value(int k) const { return values_[size_of(k)]; }
+    [[nodiscard]] const double* vector(int k) const { return vectors_.data() + size_of(k) * values_.size(); }
     /// How many eigenvalues are above a bound.
     [[nodiscard]] int above(double bound) const {
-      int result = 0;
-      while (result < count_ && value(result) > bound) ++result;
-      return result;
+      const auto past =
+          std::find_if(values_.begin(), values_.end(), [bound](double v) { return !(v > bound); });
+      return static_cast<int>(past - values_.begin());
     }
 
   private:
-    int count_;
-    Eigen::SelfAdjointEigenSolver<Matrix<dynamic, dynamic, Real>> solver_;
+    static std::size_t size_of(int count) { return static_cast<std::size_t>(count); }
+    std::vector<double> values_, vectors_;
   };
 
   template <int K>

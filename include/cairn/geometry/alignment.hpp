@@ -14,16 +14,18 @@
 /// values of S, s3 < 0 where a reflection would fit better: rank and ambiguity are read from them. O(n).
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <optional>
 #include <span>
 #include <string>
-#include <utility>
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/core/symmetric_eigen.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
 
@@ -70,56 +72,6 @@ struct Alignment {
 };
 
 namespace detail {
-
-/// Eigenvalues, largest first, and the matching unit eigenvectors as columns, of a symmetric 4x4 matrix:
-/// Jacobi's rotations until nothing is left off the diagonal.
-struct SymmetricEigen4 {
-  Vector<4> values;
-  Matrix<4> vectors;
-};
-
-[[nodiscard]] inline SymmetricEigen4 symmetric_eigen(Matrix<4> a) {
-  Matrix<4> v = Matrix<4>::Identity();
-  const auto rotate = [&](int p, int q) {
-    const double theta = (a(q, q) - a(p, p)) / (2 * a(p, q));
-    const double t = (theta >= 0 ? 1 : -1) / (std::abs(theta) + std::sqrt(theta * theta + 1));
-    const double c = 1 / std::sqrt(t * t + 1), s = t * c;
-    for (int k = 0; k < 4; ++k) {
-      const double kp = a(k, p), kq = a(k, q);
-      a(k, p) = c * kp - s * kq;
-      a(k, q) = s * kp + c * kq;
-      const double vp = v(k, p), vq = v(k, q);
-      v(k, p) = c * vp - s * vq;
-      v(k, q) = s * vp + c * vq;
-    }
-    for (int k = 0; k < 4; ++k) {
-      const double pk = a(p, k), qk = a(q, k);
-      a(p, k) = c * pk - s * qk;
-      a(q, k) = s * pk + c * qk;
-    }
-    a(p, q) = a(q, p) = 0;
-  };
-  for (int sweep = 0; sweep < 30; ++sweep) {
-    double largest = 0;
-    for (int p = 0; p < 3; ++p)
-      for (int q = p + 1; q < 4; ++q) {
-        const double size = std::abs(a(p, q));
-        // Smaller than rounding of both diagonal entries: a rotation would change nothing.
-        if (size <= 1e-17 * (std::abs(a(p, p)) + std::abs(a(q, q)))) continue;
-        largest = std::max(largest, size);
-        rotate(p, q);
-      }
-    if (largest == 0) break;
-  }
-  SymmetricEigen4 result{Vector<4>(a(0, 0), a(1, 1), a(2, 2), a(3, 3)), v};
-  for (int i = 0; i < 3; ++i)
-    for (int j = 3; j > i; --j)
-      if (result.values(j) > result.values(j - 1)) {
-        std::swap(result.values(j), result.values(j - 1));
-        for (int k = 0; k < 4; ++k) std::swap(result.vectors(k, j), result.vectors(k, j - 1));
-      }
-  return result;
-}
 
 /// Horn's matrix of S = sum w x y^T.
 [[nodiscard]] inline Matrix<4> horn_matrix(const Matrix<3>& S) {
@@ -271,12 +223,15 @@ inline void alignment_covariance(const AlignmentMoments& m, double scale, bool d
     if (!(weight >= 0)) detail::refuse_alignment(source, target, weights);
   if (m.weight == 0) return result;
 
-  const detail::SymmetricEigen4 eigen = detail::symmetric_eigen(detail::horn_matrix(m.cross));
-  const Vector<4> q = eigen.vectors.col(0);
-  const SO3 R = SO3::from_quaternion(q(0), q(1), q(2), q(3));
-  const double s1 = 0.5 * (eigen.values(0) + eigen.values(1)), s2 = 0.5 * (eigen.values(0) + eigen.values(2)),
-               s3 = 0.5 * (eigen.values(0) + eigen.values(3));
-  const double fit = eigen.values(0), source_squares = m.source.trace(), zero = options.tolerance * s1;
+  Matrix<4> N = detail::horn_matrix(m.cross);
+  std::array<double, 4> values;
+  std::array<double, 16> q;  // the first four numbers belong to the largest value
+  if (!symmetric_eigen(std::span<double, 16>(N.data(), 16), std::span(values), std::span(q)))
+    detail::refuse_alignment(source, target, weights);
+  const SO3 R = SO3::from_quaternion(q[0], q[1], q[2], q[3]);
+  const double s1 = 0.5 * (values[0] + values[1]), s2 = 0.5 * (values[0] + values[2]),
+               s3 = 0.5 * (values[0] + values[3]);
+  const double fit = values[0], source_squares = m.source.trace(), zero = options.tolerance * s1;
   if (options.with_scale && source_squares > 0 && fit > 0) result.scale = fit / source_squares;
   result.T_target_source = SE3(R, m.target_mean - result.scale * R.rotate(m.source_mean));
 

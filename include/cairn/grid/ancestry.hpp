@@ -65,7 +65,7 @@ public:
   /// The cell, or Cell{} where nothing was written; until the next write to any grid of the tree.
   [[nodiscard]] const Cell& read(CellAddress cell) const {
     const Cell* found = tree_->find(node_, cell);
-    return found == nullptr ? empty_ : *found;
+    return found == nullptr ? blank : *found;
   }
   /// The cell of this grid alone; until the next write to any grid of the tree.
   [[nodiscard]] Cell& write(CellAddress cell) {
@@ -193,7 +193,7 @@ private:
       return sum;
     }
     [[nodiscard]] std::size_t bytes() const noexcept {
-      std::size_t sum = nodes() * (sizeof(Node) + sizeof(written_[0]));
+      std::size_t sum = nodes() * (sizeof(Node) + sizeof(typename decltype(written_)::value_type));
       for (const auto& cells : written_) sum += cells.size() * sizeof(CellAddress);
       cells_.for_each_tile([&](TileAddress, const auto& tile) {
         sum += sizeof tile;
@@ -315,7 +315,7 @@ private:
     SharedTiles<Entries> cells_;                     // shared with nobody
   };
 
-  static inline const Cell empty_{};
+  static inline const Cell blank{};
   std::shared_ptr<Tree> tree_;
   NodeNumber node_ = 0;
 };

@@ -33,7 +33,7 @@ public:
   /// The cell, or Cell{} where nothing was written. Two loads and a comparison from the tile's own.
   [[nodiscard]] const Cell& read(CellAddress cell) const noexcept {
     const Tile* found = tile(tile_of(cell));
-    return found == nullptr ? empty_ : (*found)[place_in_tile(cell)];
+    return found == nullptr ? blank : (*found)[place_in_tile(cell)];
   }
   /// The cell of this grid alone. Throws Error where the grid would be wider than 2^16 tiles.
   [[nodiscard]] Cell& write(CellAddress cell) { return writable_tile(tile_of(cell))[place_in_tile(cell)]; }
@@ -167,7 +167,7 @@ private:
     root_ = std::move(root);
   }
 
-  static inline const Cell empty_{};
+  static inline const Cell blank{};
   Counted<Root> root_;
 };
 

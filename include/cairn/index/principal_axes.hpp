@@ -7,19 +7,17 @@
 /// A rotation changes no Euclidean distance, so trees of turned points answer as before. But splits along the
 /// axes of largest variance separate better, and a distance that is summed from the first coordinate on is
 /// known to be too large after a few of them. Turned coordinates are rounded in proportion to the length of
-/// what was turned: points far from the origin are turned about the mean. The eigenvectors of the covariance
-/// are found by Jacobi's method (cyclic, Golub and Van Loan, "Matrix Computations", 4th ed., section 8.5).
+/// what was turned: points far from the origin are turned about the mean.
 #pragma once
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
-#include <numeric>
 #include <span>
 #include <vector>
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/sizes.hpp>
+#include <cairn/core/symmetric_eigen.hpp>
 #include <cairn/index/detail/block_lanes.hpp>
 #include <cairn/index/points.hpp>
 
@@ -89,53 +87,15 @@ private:
     return sums;
   }
 
-  void learn(std::vector<double> matrix) {
-    std::vector<double> vectors(dim_ * dim_, 0.0);  // rows are eigenvectors
-    for (std::size_t a = 0; a < dim_; ++a) vectors[a * dim_ + a] = 1;
-    double trace = 0;
-    for (std::size_t a = 0; a < dim_; ++a) trace += matrix[a * dim_ + a];
-    for (int sweep = 0; sweep < 30; ++sweep) {
-      double rest = 0;
-      for (std::size_t p = 0; p < dim_; ++p)
-        for (std::size_t q = p + 1; q < dim_; ++q) rest += std::abs(matrix[p * dim_ + q]);
-      if (!(rest > 1e-9 * trace)) break;
-      for (std::size_t p = 0; p < dim_; ++p)
-        for (std::size_t q = p + 1; q < dim_; ++q) annihilate(matrix, vectors, p, q);
-    }
-    store(matrix, vectors);
-  }
-
-  /// Turns the plane of axes p and q so that matrix[p][q] becomes zero.
-  void annihilate(std::vector<double>& matrix, std::vector<double>& vectors, std::size_t p,
-                  std::size_t q) const {
-    const double off = matrix[p * dim_ + q];
-    if (off == 0) return;
-    const double ratio = (matrix[q * dim_ + q] - matrix[p * dim_ + p]) / (2 * off);
-    const double tangent = (ratio < 0 ? -1 : 1) / (std::abs(ratio) + std::hypot(1.0, ratio));
-    const double cosine = 1 / std::hypot(1.0, tangent);
-    const double sine = tangent * cosine;
-    const auto turn_pair = [&](double& x, double& y) {
-      const double old = x;
-      x = cosine * old - sine * y;
-      y = sine * old + cosine * y;
-    };
-    for (std::size_t i = 0; i < dim_; ++i) turn_pair(matrix[p * dim_ + i], matrix[q * dim_ + i]);
-    for (std::size_t i = 0; i < dim_; ++i) turn_pair(matrix[i * dim_ + p], matrix[i * dim_ + q]);
-    for (std::size_t i = 0; i < dim_; ++i) turn_pair(vectors[p * dim_ + i], vectors[q * dim_ + i]);
-  }
-
   /// Keeps the eigenvectors, largest variance first, as the columns that turn() adds up.
-  void store(const std::vector<double>& matrix, const std::vector<double>& vectors) {
-    std::vector<std::size_t> order(dim_);
-    std::iota(order.begin(), order.end(), std::size_t{0});
-    std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-      const double of_a = matrix[a * dim_ + a], of_b = matrix[b * dim_ + b];
-      return of_a > of_b || (of_a == of_b && a < b);
-    });
+  void learn(std::vector<double> matrix) {
+    std::vector<double> values(dim_), vectors(dim_ * dim_);
+    if (!symmetric_eigen(std::span(matrix), std::span(values), std::span(vectors), 1e-9))
+      raise("PrincipalAxes: coordinates so large that their squares overflow");
     columns_.resize(dim_ * dim_);
     for (std::size_t i = 0; i < dim_; ++i)
       for (std::size_t a = 0; a < dim_; ++a)
-        columns_[a * dim_ + i] = static_cast<float>(vectors[order[i] * dim_ + a]);
+        columns_[a * dim_ + i] = static_cast<float>(vectors[i * dim_ + a]);
   }
 
   std::size_t dim_ = 0;

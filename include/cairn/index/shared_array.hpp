@@ -27,14 +27,14 @@ public:
 
   /// The element, or T{} where nothing was written.
   [[nodiscard]] const T& operator[](std::size_t i) const noexcept {
-    if (i >= size_) return empty_;
+    if (i >= size_) return blank;
     const Branch* at = root_.get();
     for (int level = height_; level > 1; --level) {
       at = at->branches[digit(i, level)].get();
-      if (at == nullptr) return empty_;
+      if (at == nullptr) return blank;
     }
     const Leaf* leaf = at->leaves[digit(i, 1)].get();
-    return leaf == nullptr ? empty_ : (*leaf)[digit(i, 0)];
+    return leaf == nullptr ? blank : (*leaf)[digit(i, 0)];
   }
 
   /// The element of this array alone; valid until the array is copied or written elsewhere.
@@ -74,7 +74,7 @@ private:
     ++height_;
   }
 
-  static inline const T empty_{};
+  static inline const T blank{};
   Counted<Branch> root_;
   int height_ = 0;  // levels of branches
   std::size_t size_ = 0;

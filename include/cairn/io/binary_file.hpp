@@ -113,7 +113,7 @@ public:
   [[nodiscard]] T get() {
     if (rest_.size() < sizeof(T)) raise(name_ + ": the file has fewer numbers than it says");
     T value;
-    std::memcpy(&value, rest_.data(), sizeof(T));
+    rest_.copy(reinterpret_cast<char*>(&value), sizeof(T));
     rest_.remove_prefix(sizeof(T));
     return value;
   }

@@ -115,6 +115,7 @@ public:
   /// Ascending.
   [[nodiscard]] std::vector<std::uint32_t> landmark_ids() const {
     std::vector<std::uint32_t> ids;
+    ids.reserve(landmarks_.size());
     for (const detail::KeyframeLandmark& one : landmarks_) ids.push_back(one.id);
     std::ranges::sort(ids);
     return ids;

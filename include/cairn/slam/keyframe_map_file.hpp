@@ -162,7 +162,7 @@ private:
   }
 
   static void put(BinaryWriter& out, const SE3& pose) {
-    const SO3 r = pose.rotation();
+    const SO3& r = pose.rotation();
     for (const double value : {r.w(), r.x(), r.y(), r.z()}) out.put(value);
     fields_of_matrix(pose.translation(), PutField{&out});
   }

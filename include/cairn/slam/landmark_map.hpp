@@ -257,7 +257,7 @@ private:
   static constexpr int places = detail::place_size<Landmark>;
   static constexpr bool is_placed = places > 0;
 
-  static const LandmarkOptions& checked(const LandmarkOptions& options) {
+  static LandmarkOptions checked(const LandmarkOptions& options) {
     if (!options.valid()) raise("LandmarkMap: expected options within their ranges");
     return options;
   }
