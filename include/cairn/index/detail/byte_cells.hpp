@@ -38,12 +38,12 @@ public:
     std::size_t blocks = 0;
     for (std::size_t c = 0; c < cells.size(); ++c) {
       const std::size_t count = cells.first[c + 1] - cells.first[c];
-      extents_.push_back({blocks, count, blocks_for(count)});
+      extents_.push_back({static_cast<std::uint32_t>(blocks), static_cast<std::uint32_t>(count),
+                          static_cast<std::uint32_t>(blocks_for(count)), 0});
       blocks += blocks_for(count);
     }
     members_ = ByteBlocks(dim, blocks);
     ids_.assign(blocks * block_size, no_point);
-    radii_.assign(cells.size(), 0);
     for (std::size_t c = 0; c < cells.size(); ++c) {
       for (std::size_t i = 0; i < extents_[c].count; ++i) {
         const std::size_t point = cells.order[cells.first[c] + i];
@@ -70,10 +70,10 @@ public:
     return std::span(ids_).subspan(extents_[cell].place(), extents_[cell].count);
   }
   /// How far a cell's points are from its mean at most, in bytes.
-  [[nodiscard]] float radius(std::size_t cell) const noexcept { return radii_[cell]; }
+  [[nodiscard]] float radius(std::size_t cell) const noexcept { return extents_[cell].radius; }
   [[nodiscard]] std::size_t bytes() const noexcept {
     return members_.bytes() + means_.bytes() + ids_.capacity() * sizeof(PointId) +
-           extents_.capacity() * sizeof(Extent) + radii_.capacity() * sizeof(float) +
+           extents_.capacity() * sizeof(Extent) +
            (block_of_.capacity() + cell_of_.capacity()) * sizeof(std::uint32_t);
   }
 
@@ -111,7 +111,7 @@ public:
     make_room(cell);
     if (extents_[cell].count >= most) prepare_split(cell, codes);
     put(cell, id, codes);
-    radii_[cell] = std::max(radii_[cell], reach);
+    extents_[cell].radius = std::max(extents_[cell].radius, reach);
     if (extents_[cell].count > most) split(cell);
   }
 
@@ -136,11 +136,13 @@ public:
 private:
   static constexpr std::uint32_t nowhere = std::numeric_limits<std::uint32_t>::max();
 
+  /// All that a search asks of a cell, in one place.
   struct Extent {
-    std::size_t first;  ///< block
-    std::size_t count;  ///< points
-    std::size_t room;   ///< blocks
-    [[nodiscard]] std::size_t place() const noexcept { return first * block_size; }
+    std::uint32_t first;  ///< block
+    std::uint32_t count;  ///< points
+    std::uint32_t room;   ///< blocks
+    float radius;         ///< how far its points are from the mean at most, in bytes
+    [[nodiscard]] std::size_t place() const noexcept { return std::size_t{first} * block_size; }
   };
 
   [[nodiscard]] static std::size_t blocks_for(std::size_t count) noexcept {
@@ -155,7 +157,7 @@ private:
   void measure_radius(std::size_t cell) {
     keys_.resize(blocks_of(cell) * block_size);
     members_.distances(extents_[cell].first, blocks_of(cell), mean_, keys_.data());
-    radii_[cell] = radius_of(
+    extents_[cell].radius = radius_of(
         *std::max_element(keys_.begin(), keys_.begin() + static_cast<std::ptrdiff_t>(extents_[cell].count)));
   }
 
@@ -167,7 +169,7 @@ private:
   }
 
   /// Empty blocks behind all others, and the memory that a move needs. Returns the first.
-  std::size_t append_blocks(std::size_t count) {
+  std::uint32_t append_blocks(std::size_t count) {
     const std::size_t first = members_.blocks();
     members_.reserve(first + count);
     reserve_ahead(ids_, (first + count) * block_size);
@@ -175,19 +177,19 @@ private:
     members_.resize(first + count);
     ids_.resize((first + count) * block_size, no_point);
     cell_of_.resize(first + count, nowhere);
-    return first;
+    return static_cast<std::uint32_t>(first);
   }
 
   /// For one more point.
   void make_room(std::size_t cell) {
     if (extents_[cell].count < extents_[cell].room * block_size) return;
     if (unused_ > members_.blocks() / 4) compact();
-    const std::size_t room = extents_[cell].room + extents_[cell].room / 4 + 1;
-    const std::size_t first = append_blocks(room);
+    const std::uint32_t room = extents_[cell].room + extents_[cell].room / 4 + 1;
+    const std::uint32_t first = append_blocks(room);
     Extent& extent = extents_[cell];
     for (std::size_t i = 0; i < extent.count; ++i) {
-      members_.copy(extent.place() + i, first * block_size + i);
-      move_id(extent.place() + i, first * block_size + i);
+      members_.copy(extent.place() + i, std::size_t{first} * block_size + i);
+      move_id(extent.place() + i, std::size_t{first} * block_size + i);
     }
     unused_ += extent.room;
     extent.first = first;
@@ -218,7 +220,7 @@ private:
         ids[next * block_size + i] = ids_[extent.place() + i];
         block_of_[ids[next * block_size + i]] = static_cast<std::uint32_t>(next + i / block_size);
       }
-      extent.first = next;
+      extent.first = static_cast<std::uint32_t>(next);
       std::fill_n(cell_of.begin() + static_cast<std::ptrdiff_t>(next), extent.room,
                   static_cast<std::uint32_t>(c));
       next += extent.room;
@@ -240,12 +242,10 @@ private:
     moving_.resize(count + 1);
     keys_.resize((blocks_for(count + 1) + means_.blocks()) * block_size);
     reserve_ahead(extents_, size() + 1);
-    reserve_ahead(radii_, size() + 1);
     means_.reserve(blocks_for(size() + 1));
     const std::size_t half = halves_.first[2] - halves_.first[1];
-    const std::size_t room = blocks_for(half + half / 4);
-    const std::size_t first = append_blocks(room);
-    spare_ = {first, 0, room};
+    const auto room = static_cast<std::uint32_t>(blocks_for(half + half / 4));
+    spare_ = {append_blocks(room), 0, room, 0};
   }
 
   /// The first half stays, the second one gets the blocks made ready.
@@ -256,7 +256,6 @@ private:
     std::fill_n(ids_.begin() + static_cast<std::ptrdiff_t>(old.place()), old.count, no_point);
     extents_[cell].count = 0;
     extents_.push_back(spare_);
-    radii_.push_back(0);
     means_.resize(blocks_for(size()));
     claim(added);
     for (std::size_t half = 0; half < 2; ++half) {
@@ -276,12 +275,10 @@ private:
     unused_ += gone.room;
     if (cell + 1 < size()) {
       extents_[cell] = extents_.back();
-      radii_[cell] = radii_.back();
       means_.copy(size() - 1, cell);
       claim(cell);
     }
     extents_.pop_back();
-    radii_.pop_back();
     means_.resize(blocks_for(size()));
   }
 
@@ -292,7 +289,6 @@ private:
   ByteBlocks members_;
   std::vector<PointId> ids_;  ///< of each place; no_point where there is none
   std::vector<Extent> extents_;
-  std::vector<float> radii_;
   std::vector<std::uint32_t> block_of_;  ///< of each id
   std::vector<std::uint32_t> cell_of_;   ///< of each block
   std::size_t unused_ = 0;               ///< blocks of no cell
