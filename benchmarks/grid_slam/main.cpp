@@ -143,7 +143,7 @@ void add_stop_rows(Scoreboard& board) {
     step.note = "on tiles " + std::to_string(per_step(tiles)) + " s";
     std::size_t differing = 0;
     for (std::size_t i = 0; i < tree.drawn.size(); ++i)
-      differing += tree.drawn[i].pose == tiles.drawn[i].pose ? 0 : 1;
+      differing += cairn::local(tree.drawn[i].pose, tiles.drawn[i].pose).isZero(0) ? 0 : 1;
     equal.measured = static_cast<double>(differing);
   } else {
     step.note = equal.note = "no data";

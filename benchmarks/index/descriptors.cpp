@@ -160,6 +160,13 @@ std::size_t budget_for(const Search& search, const std::vector<TwoNearest>& exac
   return 0;
 }
 
+/// Whether a rival that takes bytes may be given them: like for like, since our cells take bytes.
+bool are_bytes(const std::vector<float>& rows) {
+  return std::all_of(rows.begin(), rows.end(), [](float number) {
+    return number >= 0 && number <= 255 && number == std::floor(number);
+  });
+}
+
 /// A contender with the budget that reaches a mark, and what building it took.
 struct Marked {
   std::unique_ptr<DescriptorRival> contender;
@@ -198,7 +205,8 @@ void score_mark(Scoreboard& board, const std::string& name, const std::vector<fl
   others.push_back(make_flann_trees(Dim, 4));
   others.push_back(make_faiss_ivf(Dim));
   constexpr std::size_t largest_graph = 200000;  // a million take it a quarter of an hour to build
-  if (points <= largest_graph) others.push_back(make_hnswlib(Dim));
+  if (points <= largest_graph)
+    others.push_back(are_bytes(base) && are_bytes(queries) ? make_hnswlib_of_bytes(Dim) : make_hnswlib(Dim));
   const std::vector<Marked> ours = reaching(std::move(own), points / 8);
   const std::vector<Marked> rivals = reaching(std::move(others), 8192);
 

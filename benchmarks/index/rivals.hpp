@@ -68,6 +68,8 @@ struct DescriptorRival {
 };
 std::unique_ptr<DescriptorRival> make_flann_trees(std::size_t dim, int trees);
 std::unique_ptr<DescriptorRival> make_hnswlib(std::size_t dim);
+/// Only for coordinates that are whole numbers from 0 to 255.
+std::unique_ptr<DescriptorRival> make_hnswlib_of_bytes(std::size_t dim);
 std::unique_ptr<DescriptorRival> make_faiss_ivf(std::size_t dim);
 
 }  // namespace cairn_bench

@@ -91,6 +91,7 @@
 #include <cairn/index/box_query.hpp>
 #include <cairn/index/brute_force.hpp>
 #include <cairn/index/collectors.hpp>
+#include <cairn/index/descriptor_file.hpp>
 #include <cairn/index/descriptor_index.hpp>
 #include <cairn/index/index.hpp>
 #include <cairn/index/kd_forest.hpp>

@@ -9,6 +9,7 @@
 #include <limits>
 #include <numbers>
 #include <span>
+#include <sstream>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -19,6 +20,7 @@
 #include <cairn/index/best_bin_first.hpp>
 #include <cairn/index/box_query.hpp>
 #include <cairn/index/collectors.hpp>
+#include <cairn/index/descriptor_file.hpp>
 #include <cairn/index/descriptor_index.hpp>
 #include <cairn/index/index.hpp>
 #include <cairn/index/kd_forest.hpp>
@@ -155,6 +157,15 @@ TEST_CASE("docs: the example of descriptor_index.hpp finds a descriptor") {
 #include "snippets/index/descriptor_index_1.inc"
   CHECK(two.id() == 42);
   CHECK(used == std::vector<cairn::PointId>{42});
+}
+
+TEST_CASE("docs: the example of descriptor_file.hpp brings an index back") {
+  const Descriptors descriptors = some_descriptors();
+  cairn::DescriptorIndex index(descriptors);
+  std::stringstream in;
+  auto& out = in;
+#include "snippets/index/descriptor_file_1.inc"
+  CHECK(again.nearest(descriptors[42])->id == 42);
 }
 
 TEST_CASE("docs: the example of kd_forest.hpp finds a descriptor") {

@@ -24,6 +24,7 @@
 #include <cairn/index/batch_search.hpp>
 #include <cairn/index/box_query.hpp>
 #include <cairn/index/brute_force.hpp>
+#include <cairn/index/descriptor_file.hpp>
 #include <cairn/index/descriptor_index.hpp>
 #include <cairn/index/index.hpp>
 #include <cairn/index/kd_forest.hpp>
@@ -60,9 +61,22 @@ concept HasFiles = requires(const I& index, std::ostream& out, std::istream& in)
   cairn::save_tree(out, index);
   { cairn::load_tree<I>(in, "name") } -> std::same_as<I>;
 };
+/// The file is beside the caller's points.
+template <class I>
+concept HasFilesBesidePoints =
+    requires(const I& index, std::ostream& out, std::istream& in, const Points& points) {
+      cairn::save_tree(out, index);
+      { cairn::load_tree<I>(in, "name", points) } -> std::same_as<I>;
+    };
 template <class I>
 concept Grows = requires(I& index, const Points& points) {
   { index.insert(points) } -> std::same_as<cairn::PointId>;
+  { index.erase(cairn::PointId{}) } -> std::same_as<bool>;
+};
+/// With the caller's set.
+template <class I>
+concept GrowsBesidePoints = requires(I& index) {
+  index.insert(cairn::PointId{}, std::size_t{});
   { index.erase(cairn::PointId{}) } -> std::same_as<bool>;
 };
 template <class I>
@@ -70,15 +84,20 @@ concept HasBatches =
     requires(const I& index, const Points& queries) { cairn::nearest_batch(index, queries, 1); };
 
 template <class I>
-constexpr std::array<bool, 6> row{cairn::Index<I>, HasBatches<I>, HasBoxes<I>,
-                                  HasOrder<I>,     HasFiles<I>,   Grows<I>};
+constexpr std::array<bool, 6> row{cairn::Index<I>,
+                                  HasBatches<I>,
+                                  HasBoxes<I>,
+                                  HasOrder<I>,
+                                  HasFiles<I> || HasFilesBesidePoints<I>,
+                                  Grows<I> || GrowsBesidePoints<I>};
 //                                         Index  batch boxes order files grows
 static_assert(row<Brute> == std::array{true, true, true, true, false, false});
 static_assert(row<Tree> == std::array{true, true, true, true, true, false});
 static_assert(row<TreeOfAnyDimension> == std::array{true, true, true, true, true, false});
 static_assert(row<Growing> == std::array{true, true, true, true, true, true});
 static_assert(row<Forest> == std::array{true, true, false, false, false, false});
-static_assert(row<Cells> == std::array{true, true, false, false, false, false});
+static_assert(row<Cells> == std::array{true, true, false, false, true, true});
+static_assert(HasFilesBesidePoints<Cells> && GrowsBesidePoints<Cells>);
 
 // What a tree is made of is nobody's business.
 template <class I>
@@ -383,6 +402,29 @@ TEST_SUITE("capabilities") {
   TEST_CASE("capabilities: DescriptorIndex does") {
     for_sets([](const Points& points, const Points& queries) {
       check_all(Cells(points, {.points_in_cell = 24}), numbered(points), queries);
+    });
+  }
+
+  TEST_CASE("capabilities: DescriptorIndex does while its set grows and points go, and from a file") {
+    for_sets([](const Points& points, const Points& queries) {
+      Points set;
+      Cells index(set, {.points_in_cell = 8});
+      Known known;
+      for (std::size_t begin = 0; begin < points.size(); begin += 50) {
+        const std::size_t end = std::min(points.size(), begin + 50);
+        set.assign(points.begin(), points.begin() + static_cast<std::ptrdiff_t>(end));
+        index.insert(static_cast<cairn::PointId>(begin), end - begin);
+        for (std::size_t i = begin; i < end; ++i) known[static_cast<cairn::PointId>(i)] = points[i];
+      }
+      check_all(index, known, queries);
+      for (std::size_t i = 0; i < points.size(); i += 3) {
+        REQUIRE(index.erase(static_cast<cairn::PointId>(i)));
+        known.erase(static_cast<cairn::PointId>(i));
+      }
+      check_all(index, known, queries);
+      std::stringstream file;
+      cairn::save_tree(file, index);
+      check_all(cairn::load_tree<Cells>(file, "cells", set), known, queries);
     });
   }
 

@@ -1,9 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
+#include <set>
 #include <span>
 #include <string>
 #include <vector>
@@ -206,6 +209,205 @@ TEST_SUITE("descriptor_index") {
     CHECK(search.search(index, std::vector<float>(8, 0.3F), nearest, {}, &work));
     CHECK(nearest.reduced() == 0);
     CHECK(work.leaves == 2);
+  }
+
+  TEST_CASE("it grows and shrinks like a set, whatever the points, and answers like brute force") {
+    const std::uint64_t seed = cairn_test::seed(86);
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    for (const std::string& shape : cairn_test::shapes())
+      for (const std::size_t dim : {1U, 7U}) {
+        CAPTURE(shape);
+        CAPTURE(dim);
+        const auto numbers = cairn_test::make_points<float>(shape, 1500, dim, random);
+        Points points{std::span(numbers).first(100 * dim), dim};
+        Index index(points, {.points_in_cell = 12});
+        std::set<cairn::PointId> live;
+        for (cairn::PointId id = 0; id < 100; ++id) live.insert(id);
+        std::size_t known = 100;
+        for (int step = 0; step < 60; ++step) {
+          const std::size_t more = std::min<std::size_t>(random.below(80), 1500 - known);
+          points = Points(std::span(numbers).first((known + more) * dim), dim);
+          index.insert(static_cast<cairn::PointId>(known), more);
+          for (std::size_t i = 0; i < more; ++i) live.insert(static_cast<cairn::PointId>(known++));
+          const std::size_t gone = step == 40 ? 100000 : random.below(50);  // once all of them
+          for (std::size_t i = 0; i < (gone > known ? known : gone); ++i) {
+            const auto id = static_cast<cairn::PointId>(gone > known ? i : random.below(known));
+            REQUIRE(index.erase(id) == (live.erase(id) > 0));
+          }
+          if (step % 3 == 0)  // what was erased may come back
+            for (int i = 0; i < 20; ++i) {
+              const auto id = static_cast<cairn::PointId>(random.below(known));
+              if (live.insert(id).second) index.insert(id);
+            }
+          REQUIRE(index.size() == live.size());
+          std::vector<float> rows;
+          for (const cairn::PointId id : live) {
+            const auto point = points[id];
+            for (std::size_t a = 0; a < dim; ++a) rows.push_back(point[a]);
+          }
+          const auto query = cairn_test::make_points<float>("uniform", 1, dim, random);
+          const auto found = index.nearest(query, 5);
+          REQUIRE(found.size() == std::min<std::size_t>(5, live.size()));
+          if (live.empty()) continue;
+          const auto expected = cairn::BruteForce<float>(Points(rows, dim)).nearest(query, 5);
+          for (std::size_t i = 0; i < found.size(); ++i) {
+            REQUIRE(live.contains(found[i].id));
+            REQUIRE(found[i].distance == doctest::Approx(expected[i].distance).epsilon(1e-5));
+          }
+        }
+      }
+  }
+
+  TEST_CASE("an index that grew keeps its cells small, and finds about as much as one built at once") {
+    cairn::Random random(cairn_test::seed(87));
+    std::vector<float> numbers(12000 * 16);
+    for (std::size_t i = 0; i < numbers.size(); i += 16) {
+      float hidden[4];
+      for (float& number : hidden) number = static_cast<float>(random.normal());
+      for (std::size_t a = 0; a < 16; ++a)
+        numbers[i + a] = hidden[a % 4] * hidden[(a * a + 1) % 4] + 0.1F * static_cast<float>(random.normal());
+    }
+    const Points all(numbers, 16);
+    const Index at_once(all);
+    Points part{std::span(numbers).first(500 * 16), 16};
+    Index grown(part);
+    for (std::size_t begin = 500; begin < 12000; begin += 500) {
+      part = Points(std::span(numbers).first((begin + 500) * 16), 16);
+      grown.insert(static_cast<cairn::PointId>(begin), 500);
+    }
+    CHECK(grown.cells() >= 12000 / 64);
+    CHECK(grown.bytes() < 12000 * (16 + 4 + 4 + 4) * 3);
+    const cairn::BruteForce<float> brute(all);
+    int of_grown = 0, of_built = 0;
+    for (int i = 0; i < 300; ++i) {
+      const std::size_t place = 16 * random.below(12000);
+      std::vector<float> query(&numbers[place], &numbers[place] + 16);
+      for (float& number : query) number += 0.1F * static_cast<float>(random.normal());
+      const auto nearest = brute.nearest(query)->id;
+      of_grown += grown.nearest(query, {.leaves = 8})->id == nearest;
+      of_built += at_once.nearest(query, {.leaves = 8})->id == nearest;
+    }
+    MESSAGE(of_grown << " of 300 found by the index that grew, " << of_built << " by the one built at once");
+    CHECK(of_built > 200);
+    CHECK(of_grown > of_built - 30);
+  }
+
+  TEST_CASE("points far outside of the first, of no byte's value, and whole regions erased") {
+    cairn::Random random(cairn_test::seed(88));
+    std::vector<float> numbers(4000);
+    for (std::size_t i = 0; i < 4000; ++i)
+      numbers[i] = i < 2000   ? static_cast<float>(random.below(200))
+                   : i < 3000 ? static_cast<float>(200 * random.uniform())
+                              : static_cast<float>(2000 * random.uniform()) - 500;
+    const auto first = [&](std::size_t count) {
+      return Points(std::span<const float>(numbers).first(2 * count), 2);
+    };
+    Points points = first(1000);
+    Index index(points, {.points_in_cell = 100});
+    REQUIRE(index.bytes_are_exact());
+    std::vector<float> live(numbers.begin(), numbers.begin() + 2000);
+    const auto check = [&] {
+      const Points left(live, 2);
+      const cairn::BruteForce<float> brute(left);
+      for (int i = 0; i < 300; ++i) {
+        const std::vector<float> query{static_cast<float>(2400 * random.uniform()) - 700,
+                                       static_cast<float>(2400 * random.uniform()) - 700};
+        const auto found = index.nearest(query, 3);
+        const auto expected = brute.nearest(query, 3);
+        for (std::size_t k = 0; k < 3; ++k)
+          REQUIRE(found[k].distance == doctest::Approx(expected[k].distance).epsilon(1e-5));
+        const std::vector<float> near{query[0] / 12 + 60, query[1] / 12 + 60};
+        REQUIRE(index.nearest(near)->distance ==
+                doctest::Approx(brute.nearest(near)->distance).epsilon(1e-5));
+      }
+    };
+    for (const std::size_t known : {1000U, 1500U, 2000U}) {
+      points = first(known);
+      index.insert(static_cast<cairn::PointId>(live.size() / 2), known - live.size() / 2);
+      live.assign(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(2 * known));
+      check();
+    }
+    CHECK_FALSE(index.bytes_are_exact());
+    for (const float side : {40.0F, 80.0F, 120.0F}) {  // of a stripe that is emptied
+      const std::size_t cells = index.cells();
+      live.clear();
+      for (cairn::PointId id = 0; id < 2000; ++id) {
+        if (points[id][0] < side)
+          index.erase(id);
+        else
+          live.insert(live.end(), {points[id][0], points[id][1]});
+      }
+      REQUIRE(index.size() == live.size() / 2);
+      if (side > 100) CHECK(index.cells() < cells);
+      check();
+    }
+  }
+
+  TEST_CASE("points that widen a cell are found across its border, and cells outlive others that go") {
+    cairn::Random random(cairn_test::seed(89));
+    std::vector<std::array<float, 2>> points;
+    const auto add = [&](float x, std::size_t count) {
+      for (std::size_t i = 0; i < count; ++i)
+        points.push_back(
+            {x + static_cast<float>(random.below(16)), 20 + static_cast<float>(random.below(16))});
+    };
+    for (const float x : {10.0F, 80.0F, 150.0F, 220.0F}) add(x, 100);
+    cairn::DescriptorIndex index(points, {.points_in_cell = 100});
+    REQUIRE(index.cells() == 4);
+    add(36, 60);  // on the first cell's side of the border at 53
+    index.insert(400, 60);
+    REQUIRE(index.cells() == 4);  // they joined the first
+    for (cairn::PointId gone = 0; gone < 400; gone += 100) {
+      for (int i = 0; i < 300; ++i) {
+        const std::array query{static_cast<float>(240 * random.uniform()),
+                               static_cast<float>(60 * random.uniform())};
+        float least = std::numeric_limits<float>::infinity();
+        for (cairn::PointId id = gone; id < points.size(); ++id)
+          least = std::min(least, std::hypot(points[id][0] - query[0], points[id][1] - query[1]));
+        REQUIRE(index.nearest(query)->distance == doctest::Approx(least).epsilon(1e-5));
+      }
+      for (cairn::PointId id = gone; id < gone + 100; ++id) REQUIRE(index.erase(id));
+      if (gone == 0)  // and the first cell with them
+        for (cairn::PointId id = 400; id < 460; ++id) REQUIRE(index.erase(id));
+      if (gone == 0) CHECK(index.cells() == 3);
+      if (gone == 0) points.resize(400);
+    }
+    CHECK(index.empty());
+  }
+
+  TEST_CASE("insertions of what is there, is none of the set or is not finite change nothing") {
+    using cairn_test::message_of;
+    std::vector<std::array<float, 2>> points(50);
+    for (std::size_t i = 0; i < 50; ++i) points[i] = {static_cast<float>(i), 1};
+    cairn::DescriptorIndex index(points);
+    const auto refusal = [&](cairn::PointId first, std::size_t count) {
+      return message_of([&] { index.insert(first, count); });
+    };
+    CHECK(refusal(50, 1).find("of a set of 50") != std::string::npos);
+    CHECK(refusal(cairn::no_point, 1).find("of a set of 50") != std::string::npos);
+    CHECK(refusal(7, 1).find("point 7 is in the index already") != std::string::npos);
+    points.resize(60, {100, 2});
+    points[57][1] = std::numeric_limits<float>::infinity();
+    CHECK(refusal(50, 10).find("point 57, coordinate 1") != std::string::npos);
+    CHECK(refusal(49, 5).find("point 49 is in the index already") != std::string::npos);
+    CHECK(index.size() == 50);
+    CHECK(index.nearest(std::array{100.0F, 2.0F})->id == 49);
+    CHECK_FALSE(index.erase(55));
+    CHECK_FALSE(index.erase(cairn::no_point));
+    index.insert(50, 7);
+    CHECK(index.nearest(std::array{100.0F, 2.0F})->distance == 0);
+  }
+
+  TEST_CASE("a difference that rounds to a byte's value is not taken for the point") {
+    // From -2^33 on, 0.3 and 0.4 are the same 128 steps of 2^26 away.
+    const std::vector<float> numbers{-8589934592.0F, 8455716864.0F, 0.3F, 0.4F};
+    const Points points(numbers, 1);
+    const Index index(points);
+    const auto found = index.nearest(std::vector<float>{0.3F}, 2);
+    CHECK(found[0].id == 2);
+    CHECK(found[1].id == 3);
+    CHECK(found[1].distance == doctest::Approx(0.1));
   }
 
   TEST_CASE("nothing in it, and bad input") {

@@ -22,6 +22,10 @@
 /// their proportions. How far bytes are from their points is known: whoever may be nearer than the
 /// collector's limit by that much is measured again, exactly; where the bytes are the points (SIFT), nobody
 /// is. Without a budget the answers are those of BruteForce. Euclidean distances only.
+///
+/// The index grows and shrinks with the caller's set: cells that have become too full split. s and low are
+/// those of the points of the build: of others, far outside, the bytes say little, and they are measured.
+/// descriptor_file.hpp saves it.
 #pragma once
 
 #include <algorithm>
@@ -30,15 +34,18 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <cairn/core/check.hpp>
 #include <cairn/index/collectors.hpp>
 #include <cairn/index/detail/answers.hpp>
 #include <cairn/index/detail/byte_blocks.hpp>
+#include <cairn/index/detail/byte_cells.hpp>
 #include <cairn/index/detail/k_means.hpp>
 #include <cairn/index/metric.hpp>
 #include <cairn/index/points.hpp>
@@ -53,7 +60,12 @@ struct DescriptorIndexOptions {
   unsigned threads = 1;  ///< of the build; the index is the same for any number (0 counts as 1)
 };
 
-/// Const methods may run at the same time. The points must stay as they are while the index is used.
+namespace detail {
+struct DescriptorAccess;
+}
+
+/// Const methods may run at the same time. Points that are in the index must stay as they are; the set itself
+/// may grow.
 template <PointSet Points>
 class DescriptorIndex {
 public:
@@ -68,22 +80,15 @@ public:
   /// Throws Error, naming the point, for coordinates that are not finite, for points of different dimensions,
   /// and for more than 16384 dimensions. O(n log n + cells^2).
   explicit DescriptorIndex(const Points& points, const DescriptorIndexOptions& options = {})
-      : points_(&points), size_(static_cast<std::size_t>(points.size())) {
-    if (empty()) return;
-    detail::check_count(size_, "DescriptorIndex: point");
+      : points_(&points), options_(options) {
+    const auto count = static_cast<std::size_t>(points.size());
+    if (count == 0) return;
+    detail::check_count(count, "DescriptorIndex: point");
     low_.resize(detail::dimension_of<dynamic_dim>(points));
-    if (dimension() > detail::most_byte_axes)
-      raise("DescriptorIndex: a point may have 16384 coordinates at most, got " +
-            std::to_string(dimension()));
-    const auto rows = detail::copy_points<float>(points, dimension(), "DescriptorIndex: point");
-    const std::vector<std::uint8_t> codes = encode(rows);
-    const std::size_t in_cell =
-        options.points_in_cell > 0
-            ? options.points_in_cell
-            : std::max<std::size_t>(2 * detail::block_size,
-                                    static_cast<std::size_t>(std::sqrt(static_cast<double>(size_)) / 6));
-    detail::KMeansBuilder builder(codes, dimension(), options.threads);
-    fill(codes, builder.build(depth_for(in_cell), options.rounds));
+    check_dimension();
+    std::vector<PointId> ids(count);
+    std::iota(ids.begin(), ids.end(), PointId{0});
+    build(detail::copy_points<float>(points, dimension(), "DescriptorIndex: point"), ids);
   }
   explicit DescriptorIndex(const Points&&, const DescriptorIndexOptions& = {}) = delete;  ///< would be gone
 
@@ -91,14 +96,54 @@ public:
   [[nodiscard]] bool empty() const noexcept { return size_ == 0; }
   [[nodiscard]] std::size_t dimension() const noexcept { return low_.size(); }
   [[nodiscard]] L2 metric() const noexcept { return {}; }
-  [[nodiscard]] std::size_t cells() const noexcept { return radii_.size(); }
+  [[nodiscard]] std::size_t cells() const noexcept { return cells_.size(); }
   /// True where every coordinate is a byte's value exactly, so that distances of bytes are distances.
   [[nodiscard]] bool bytes_are_exact() const noexcept { return error_ == 0; }
   /// Memory held, the caller's points not included.
   [[nodiscard]] std::size_t bytes() const noexcept {
-    return members_.bytes() + means_.bytes() + ids_.capacity() * sizeof(PointId) +
-           first_block_.capacity() * sizeof(std::size_t) +
-           (radii_.capacity() + low_.capacity()) * sizeof(float);
+    return cells_.bytes() + low_.capacity() * sizeof(float);
+  }
+
+  /// Takes in points first ... first + count - 1 of the caller's set, which may have grown, or in which
+  /// points that were erased have been written anew. Throws Error, naming the point, where one is already
+  /// there, is none of the set, not finite or of another dimension; the index is as it was then. Into an
+  /// index without cells: a build. O(cells) a point and a split now and then.
+  void insert(PointId first, std::size_t count = 1) {
+    const auto known = static_cast<std::size_t>(points_->size());
+    if (first > known || count > known - first)
+      raise("DescriptorIndex::insert: points " + std::to_string(first) + " ... " +
+            std::to_string(std::uint64_t{first} + count) + " (excluded) of a set of " +
+            std::to_string(known));
+    if (count == 0) return;
+    detail::check_count(known, "DescriptorIndex: point");
+    const bool fresh = cells() == 0;
+    const std::size_t dim = fresh ? detail::size_of_point((*points_)[first], 0) : dimension();
+    std::vector<float> rows(detail::room_for(count, dim, "DescriptorIndex: point"));
+    for (std::size_t i = 0; i < count; ++i)
+      detail::copy_point<float>((*points_)[first + i], dim, rows.data() + i * dim,
+                                {"DescriptorIndex: point", first + i});
+    std::vector<PointId> ids(count);
+    std::iota(ids.begin(), ids.end(), first);
+    if (fresh) {
+      DescriptorIndex built(points_, options_);
+      built.low_.resize(dim);
+      built.check_dimension();
+      built.build(rows, ids);
+      *this = std::move(built);
+    } else {
+      insert_rows(rows, ids);
+    }
+  }
+
+  /// Takes a point out, whose coordinates are not looked at; returns whether it was there. O(1), but for the
+  /// first change of an index: O(n). Memory is given back by later insertions.
+  bool erase(PointId id) {
+    if (empty()) return false;
+    cells_.number_places(0);
+    if (!cells_.contains(id)) return false;
+    cells_.erase(id);
+    --size_;
+    return true;
   }
 
   /// The nearest point, of all or of those that a search under a budget meets.
@@ -136,14 +181,19 @@ public:
     return search(query, collector, options, scratch);
   }
 
-  /// Calls visit(id, std::span<const float>) for every point, in the order of the set; the span is valid
-  /// during the call.
+  /// Calls visit(id, std::span<const float>) for every point, by ascending id; the span is valid during the
+  /// call.
   template <class Visit>
   void for_each(Visit&& visit) const {
+    std::vector<PointId> ids;
+    ids.reserve(size());
+    for (std::size_t c = 0; c < cells(); ++c)
+      ids.insert(ids.end(), cells_.members_of(c).begin(), cells_.members_of(c).end());
+    std::sort(ids.begin(), ids.end());
     std::vector<float> row(dimension());
-    for (std::size_t i = 0; i < size(); ++i) {
-      detail::copy_point<float>((*points_)[i], row.size(), row.data(), {"DescriptorIndex: point", i});
-      visit(static_cast<PointId>(i), std::span<const float>(row));
+    for (const PointId id : ids) {
+      detail::copy_point<float>((*points_)[id], row.size(), row.data(), {"DescriptorIndex: point", id});
+      visit(id, std::span<const float>(row));
     }
   }
 
@@ -165,10 +215,11 @@ public:
       const float error = index.encode(row_.data(), codes_.data());
       query_.set(codes_.data(), codes_.size());
       cells_.resize(index.cells());
-      index.means_.distances(0, index.means_.blocks(), query_, cells_.keys());
+      const detail::ByteBlocks& means = index.cells_.means();
+      means.distances(0, means.blocks(), query_, cells_.keys());
       cells_.reset();
       Offer<C> offer(index, row_.data(), error, collector);
-      Work done{.nodes = index.means_.blocks()};
+      Work done{.nodes = means.blocks()};
       const bool all = scan_cells(index, offer, budget.leaves, done);
       if (work != nullptr) *work += done;
       if (measured != nullptr) *measured += offer.measured();
@@ -183,10 +234,12 @@ public:
         if (left == 0) return false;
         const auto after = cells_.next();
         if (after.place != detail::SmallestFirst::none)
-          index.members_.prefetch(index.first_block_[after.place], index.blocks_of(after.place));
-        if (offer.may_hold_nearer(std::sqrt(static_cast<float>(cell.key)) - index.radii_[cell.place])) {
-          const std::size_t begin = index.first_block_[cell.place];
-          const std::size_t blocks = index.blocks_of(cell.place);
+          index.cells_.members().prefetch(index.cells_.first_block(after.place),
+                                          index.cells_.blocks_of(after.place));
+        if (offer.may_hold_nearer(std::sqrt(static_cast<float>(cell.key)) -
+                                  index.cells_.radius(cell.place))) {
+          const std::size_t begin = index.cells_.first_block(cell.place);
+          const std::size_t blocks = index.cells_.blocks_of(cell.place);
           const std::size_t scanned = std::min(left, blocks);
           scan(index, begin, scanned, offer);
           done.leaves += scanned;
@@ -205,9 +258,9 @@ public:
       std::int32_t distances[at_once * detail::block_size];
       for (const std::size_t end = block + count; block < end;) {
         const std::size_t now = std::min(at_once, end - block);
-        index.members_.distances(block, now, query_, distances);
+        index.cells_.members().distances(block, now, query_, distances);
         for (std::size_t i = 0; i < now; ++i, ++block)
-          offer.block(distances + i * detail::block_size, index.ids_.data() + block * detail::block_size);
+          offer.block(distances + i * detail::block_size, index.cells_.ids_of(block));
       }
     }
 
@@ -218,6 +271,11 @@ public:
   };
 
 private:
+  friend struct detail::DescriptorAccess;
+
+  DescriptorIndex(const Points* points, const DescriptorIndexOptions& options)
+      : points_(points), options_(options) {}
+
   /// Passes on to a collector whoever the bytes cannot exclude.
   template <class C>
   class Offer {
@@ -331,42 +389,56 @@ private:
       const float code = std::clamp(std::floor(scaled + 0.5F), 0.0F, 255.0F);
       codes[a] = static_cast<std::uint8_t>(code);
       sum += (scaled - code) * (scaled - code);
-      exact = exact && scaled == code;
+      // A difference may be rounded to a byte's value, and the point not be there.
+      exact = exact && scaled == code && low_[a] + code * unit_ == row[a];
     }
     return exact ? 0 : std::sqrt(sum) * 1.001F + 1e-3F;
   }
 
-  void fill(const std::vector<std::uint8_t>& codes, const detail::KMeans& cells) {
-    const std::size_t dim = dimension();
-    const auto mean_of = [&](std::size_t cell) { return &cells.means[cell * dim]; };
-    means_ = detail::ByteBlocks::of_rows(dim, cells.size(), mean_of);
-    first_block_.assign(cells.size() + 1, 0);
-    for (std::size_t c = 0; c < cells.size(); ++c)
-      first_block_[c + 1] = first_block_[c] + (cells.first[c + 1] - cells.first[c] + detail::block_size - 1) /
-                                                  detail::block_size;
-    members_ = detail::ByteBlocks(dim, first_block_.back());
-    ids_.assign(first_block_.back() * detail::block_size, no_point);
-    radii_.assign(cells.size(), 0);
-    detail::ByteQuery mean;
-    std::vector<std::int32_t> distances;
-    for (std::size_t c = 0; c < cells.size(); ++c) {
-      const std::size_t count = cells.first[c + 1] - cells.first[c];
-      const std::size_t blocks = blocks_of(c);
-      for (std::size_t i = 0; i < blocks * detail::block_size; ++i) {
-        const std::size_t point = cells.order[cells.first[c] + std::min(i, count - 1)];
-        members_.set(first_block_[c] * detail::block_size + i, &codes[point * dim]);
-        if (i < count) ids_[first_block_[c] * detail::block_size + i] = static_cast<PointId>(point);
-      }
-      mean.set(&cells.means[c * dim], dim);
-      distances.resize(blocks * detail::block_size);
-      members_.distances(first_block_[c], blocks, mean, distances.data());
-      const auto farthest = *std::max_element(distances.begin(), distances.end());
-      radii_[c] = std::sqrt(static_cast<float>(farthest)) * 1.0001F;
-    }
+  void check_dimension() const {
+    if (dimension() > detail::most_byte_axes)
+      raise("DescriptorIndex: a point may have 16384 coordinates at most, got " +
+            std::to_string(dimension()));
   }
 
-  [[nodiscard]] std::size_t blocks_of(std::size_t cell) const noexcept {
-    return first_block_[cell + 1] - first_block_[cell];
+  void build(const std::vector<float>& rows, std::span<const PointId> ids) {
+    size_ = ids.size();
+    const std::vector<std::uint8_t> codes = encode(rows);
+    detail::KMeansBuilder builder(codes, dimension(), options_.threads);
+    cells_ = detail::ByteCells(dimension(), codes, ids, builder.build(depth_for(in_cell()), options_.rounds));
+  }
+
+  /// All or, where memory ends, none.
+  void insert_rows(const std::vector<float>& rows, std::span<const PointId> ids) {
+    const std::size_t dim = dimension();
+    std::vector<std::uint8_t> codes(rows.size());
+    float error = error_;
+    for (std::size_t i = 0; i < rows.size(); i += dim) error = std::max(error, encode(&rows[i], &codes[i]));
+    cells_.number_places(ids.back());
+    for (const PointId id : ids)
+      if (cells_.contains(id))
+        raise("DescriptorIndex::insert: point " + std::to_string(id) + " is in the index already");
+    std::size_t done = 0;
+    try {
+      for (; done < ids.size(); ++done) {
+        ++size_;
+        cells_.insert(ids[done], &codes[done * dim], 2 * in_cell());
+      }
+    } catch (...) {
+      --size_;
+      while (done > 0) {
+        cells_.erase(ids[--done]);
+        --size_;
+      }
+      throw;
+    }
+    error_ = error;
+  }
+
+  [[nodiscard]] std::size_t in_cell() const noexcept {
+    if (options_.points_in_cell > 0) return options_.points_in_cell;
+    return std::max<std::size_t>(2 * detail::block_size,
+                                 static_cast<std::size_t>(std::sqrt(static_cast<double>(size_)) / 6));
   }
 
   [[nodiscard]] float reduced_distance(const float* query, PointId id) const {
@@ -378,15 +450,12 @@ private:
   }
 
   const Points* points_;
+  DescriptorIndexOptions options_;
   std::size_t size_ = 0;
   std::vector<float> low_;
   float unit_ = 1;   ///< what a byte's step is worth
   float error_ = 0;  ///< how far the bytes of any point are from it at most, in bytes
-  detail::ByteBlocks means_;
-  detail::ByteBlocks members_;
-  std::vector<PointId> ids_;
-  std::vector<std::size_t> first_block_;  ///< of each cell, and the end
-  std::vector<float> radii_;              ///< how far a cell's points are from its mean at most, in bytes
+  detail::ByteCells cells_;
 };
 
 }}  // namespace cairn::CAIRN_ABI

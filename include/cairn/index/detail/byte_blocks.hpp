@@ -162,6 +162,13 @@ inline void byte_distances_plain(const ByteBlockRange& blocks, const ByteQuery& 
   }
 }
 
+/// Memory for at least `count` numbers, so that many calls with a few more each cost O(1) a number.
+template <class Numbers>
+void reserve_ahead(Numbers& numbers, std::size_t count) {
+  const std::size_t old = numbers.capacity();
+  if (count > old) numbers.reserve(std::max(count, old + old / 4));
+}
+
 class ByteBlocks {
 public:
   ByteBlocks() = default;
@@ -188,7 +195,7 @@ public:
 
   /// Writes point `place` (block place / 16, lane place % 16): dim bytes.
   void set(std::size_t place, const std::uint8_t* point) noexcept {
-    std::uint8_t* lane = codes_.data() + place / block_size * groups() * 64 + place % block_size * lane_axes;
+    std::uint8_t* lane = codes_.data() + first_byte(place);
     std::int32_t square = 0, sum = 0;
     for (std::size_t a = 0; a < groups() * lane_axes; ++a) {
       const std::uint8_t code = a < dim_ ? point[a] : std::uint8_t{0};
@@ -197,6 +204,32 @@ public:
       sum += code;
     }
     constants_[place] = square - 256 * sum;
+  }
+
+  /// Reads the dim bytes of point `place`.
+  void get(std::size_t place, std::uint8_t* point) const noexcept {
+    for (std::size_t a = 0; a < dim_; ++a)
+      point[a] = codes_[first_byte(place) + a / lane_axes * 64 + a % lane_axes];
+  }
+
+  /// Writes point `to` as point `from` of blocks of the same dimension.
+  void copy_from(const ByteBlocks& other, std::size_t from, std::size_t to) noexcept {
+    for (std::size_t group = 0; group < groups(); ++group)
+      std::memcpy(&codes_[first_byte(to) + group * 64], &other.codes_[first_byte(from) + group * 64],
+                  lane_axes);
+    constants_[to] = other.constants_[from];
+  }
+  void copy(std::size_t from, std::size_t to) noexcept { copy_from(*this, from, to); }
+
+  /// Memory for so many blocks, so that a resize() to them cannot throw.
+  void reserve(std::size_t blocks) {
+    reserve_ahead(codes_, room_for(blocks, groups() * 64, "DescriptorIndex"));
+    reserve_ahead(constants_, room_for(blocks, block_size, "DescriptorIndex"));
+  }
+  /// Further blocks are zeros.
+  void resize(std::size_t blocks) {
+    codes_.resize(room_for(blocks, groups() * 64, "DescriptorIndex"));
+    constants_.resize(blocks * block_size);
   }
 
   /// Squared distances of the points of blocks first ... first + count - 1.
@@ -221,6 +254,9 @@ public:
 
 private:
   [[nodiscard]] std::size_t groups() const noexcept { return (dim_ + lane_axes - 1) / lane_axes; }
+  [[nodiscard]] std::size_t first_byte(std::size_t place) const noexcept {
+    return place / block_size * groups() * 64 + place % block_size * lane_axes;
+  }
 
   std::size_t dim_ = 0;
   AlignedVector<std::uint8_t> codes_;
