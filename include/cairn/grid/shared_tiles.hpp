@@ -65,7 +65,7 @@ public:
         address_ = address;
         tile_ = grid_->tile(address);
       }
-      return tile_ == nullptr ? empty_ : (*tile_)[place_in_tile(cell)];
+      return tile_ == nullptr ? blank : (*tile_)[place_in_tile(cell)];
     }
 
   private:
