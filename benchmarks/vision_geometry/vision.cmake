@@ -5,7 +5,6 @@ find_package(dlib QUIET CONFIG)
 
 target_link_libraries(scoreboard_vision_geometry PRIVATE PNG::PNG)
 target_compile_definitions(scoreboard_vision_geometry PRIVATE
-  CAIRN_DEFAULT_DATA="${PROJECT_SOURCE_DIR}/../shared/data"
   CAIRN_BENCH_HAS_OPENCV=$<BOOL:${OpenCV_FOUND}> CAIRN_BENCH_HAS_DLIB=$<BOOL:${dlib_FOUND}>)
 if(OpenCV_FOUND)
   target_include_directories(scoreboard_vision_geometry SYSTEM PRIVATE ${OpenCV_INCLUDE_DIRS})

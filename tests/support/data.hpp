@@ -13,13 +13,14 @@
 
 namespace cairn_test {
 
-/// Path of `name` below the data folder (CAIRN_DATA, or CAIRN_DEFAULT_DATA of the build), or nothing when
-/// absent.
+/// The data folder where CAIRN_DATA names none; a program's main file may set it. A variable rather than a
+/// macro: then only that one file is compiled anew where the checkout lies elsewhere.
+inline const char* default_data_folder = nullptr;
+
+/// Path of `name` below the data folder (CAIRN_DATA, or `default_data_folder`), or nothing when absent.
 inline std::optional<std::filesystem::path> real_data(const std::string& name) {
   const char* root = std::getenv("CAIRN_DATA");
-#ifdef CAIRN_DEFAULT_DATA
-  if (root == nullptr) root = CAIRN_DEFAULT_DATA;
-#endif
+  if (root == nullptr) root = default_data_folder;
   if (root != nullptr) {
     const std::filesystem::path path = std::filesystem::path(root) / name;
     if (std::filesystem::exists(path)) return path;
