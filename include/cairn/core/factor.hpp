@@ -12,8 +12,10 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <type_traits>
+#include <vector>
 
 #include <cairn/core/linalg.hpp>
 #include <cairn/version.hpp>
@@ -39,6 +41,12 @@ template <class S>
 class View {
 public:
   View(S* data, int rows, int cols) : data_(data), rows_(rows), cols_(cols) {}
+  // NOLINTNEXTLINE(google-explicit-constructor): what may be written may be read
+  operator View<const S>() const
+    requires(!std::is_const_v<S>)
+  {
+    return {data_, rows_, cols_};
+  }
   [[nodiscard]] int rows() const noexcept { return rows_; }
   [[nodiscard]] int cols() const noexcept { return cols_; }
   S& operator()(int i, int j) const { return data_[j * rows_ + i]; }
@@ -48,6 +56,9 @@ private:
   S* data_;
   int rows_, cols_;
 };
+/// A View that is only read, of the S that the other arguments say.
+template <class S>
+using ViewOf = std::type_identity_t<View<const S>>;
 template <int R, int C, class S>
 [[nodiscard]] View<S> view(Matrix<R, C, S>& a) {
   return {a.data(), static_cast<int>(a.rows()), static_cast<int>(a.cols())};
@@ -65,6 +76,35 @@ template <int R, int C, class S>
   return result;
 }
 
+/// Room for Count numbers of any value; on the heap where Count is known at run time only.
+template <class S, int Count>
+class Room {
+public:
+  explicit Room(int) {}
+  [[nodiscard]] S* data() noexcept { return numbers_; }
+
+private:
+  S numbers_[static_cast<std::size_t>(Count)];
+};
+template <class S>
+class Room<S, dynamic> {
+public:
+  explicit Room(int count) : numbers_(static_cast<std::size_t>(count)) {}
+  [[nodiscard]] S* data() noexcept { return numbers_.data(); }
+
+private:
+  std::vector<S> numbers_;
+};
+
+/// Whether every number is finite. As all_finite(), compiled once for all sizes.
+template <class S>
+[[nodiscard, gnu::noinline]] bool finite_numbers(View<const S> a) {
+  S zero(0);
+  for (int j = 0; j < a.cols(); ++j)
+    for (int i = 0; i < a.rows(); ++i) zero += a(i, j) - a(i, j);
+  return zero == S(0);
+}
+
 /// root root^T = a for a covariance of any rank: one column for each direction with variance, zeros after
 /// them. Not triangular, but row order(k), the k-th pivot, has nothing after column k.
 template <int N, class S>
@@ -76,50 +116,50 @@ struct PivotedRoot {
 
 /// Fills `root` and `order` from a symmetric `a`, whose lower triangle is read and used up, and returns the
 /// rank; -1, and no use, where that is not finite or not positive semi-definite up to the rounding of its own
-/// diagonal. `sigma` and `waits` are room for a number a row. O(n^3 / 3).
+/// diagonal. `order` may be null; `sigma` and `waits` are room for a number a row. O(n^3 / 3).
 template <class S>
-[[nodiscard, gnu::cold, gnu::noinline]] int pivot_root(View<S> a, View<S> root, View<int> order,
-                                                       View<S> sigma, View<S> waits) {
+[[nodiscard, gnu::cold, gnu::noinline]] int pivot_root(View<S> a, View<S> root, int* order, S* sigma,
+                                                       S* waits) {
   using std::sqrt;
   constexpr S slack = rounding_share<S>;
   const int n = a.rows();
   // What is still to be explained is kept in units of the standard deviations.
   for (int i = 0; i < n; ++i) {
     if (!(a(i, i) >= S(0)) || !(a(i, i) <= std::numeric_limits<S>::max())) return -1;
-    sigma(i) = sqrt(a(i, i));
-    waits(i) = S(1);  // 0 for a row that was a pivot
-    order(i) = 0;
+    sigma[i] = sqrt(a(i, i));
+    waits[i] = S(1);  // 0 for a row that was a pivot
+    if (order != nullptr) order[i] = 0;
     for (int j = 0; j < n; ++j) root(i, j) = S(0);
     for (int j = 0; j < i; ++j) {
-      const bool vary = sigma(i) > S(0) && sigma(j) > S(0);
-      if (vary) a(i, j) = a(i, j) / sigma(i) / sigma(j);
+      const bool vary = sigma[i] > S(0) && sigma[j] > S(0);
+      if (vary) a(i, j) = a(i, j) / sigma[i] / sigma[j];
       const S most = vary ? S(1) + slack : S(0);
       if (!(a(i, j) <= most && a(i, j) >= -most)) return -1;
     }
   }
-  for (int i = 0; i < n; ++i) a(i, i) = sigma(i) > S(0) ? S(1) : S(0);
+  for (int i = 0; i < n; ++i) a(i, i) = sigma[i] > S(0) ? S(1) : S(0);
   int rank = 0;
   for (; rank < n; ++rank) {
     int best = -1;
     for (int i = 0; i < n; ++i)
-      if (waits(i) > S(0) && a(i, i) > (best < 0 ? slack : a(best, best))) best = i;
+      if (waits[i] > S(0) && a(i, i) > (best < 0 ? slack : a(best, best))) best = i;
     if (best < 0) break;
-    waits(best) = S(0);
-    order(rank) = best;
+    waits[best] = S(0);
+    if (order != nullptr) order[rank] = best;
     const S deviation = sqrt(a(best, best));
     root(best, rank) = deviation;
     for (int i = 0; i < n; ++i)
-      if (waits(i) > S(0)) root(i, rank) = (i > best ? a(i, best) : a(best, i)) / deviation;
+      if (waits[i] > S(0)) root(i, rank) = (i > best ? a(i, best) : a(best, i)) / deviation;
     for (int j = 0; j < n; ++j)
       for (int i = j; i < n; ++i)
-        if (waits(i) > S(0) && waits(j) > S(0)) a(i, j) -= root(i, rank) * root(j, rank);
+        if (waits[i] > S(0) && waits[j] > S(0)) a(i, j) -= root(i, rank) * root(j, rank);
   }
   for (int j = 0; j < n; ++j)
     for (int i = j; i < n; ++i)
-      if (waits(i) > S(0) && waits(j) > S(0) && !(a(i, j) >= S(-2) * slack && a(i, j) <= S(2) * slack))
+      if (waits[i] > S(0) && waits[j] > S(0) && !(a(i, j) >= S(-2) * slack && a(i, j) <= S(2) * slack))
         return -1;
   for (int j = 0; j < rank; ++j)
-    for (int i = 0; i < n; ++i) root(i, j) *= sigma(i);
+    for (int i = 0; i < n; ++i) root(i, j) *= sigma[i];
   return rank;
 }
 
@@ -129,18 +169,37 @@ template <int N, class S>
                                                           PivotedRoot<N, S>& result) {
   const int n = static_cast<int>(a.rows());
   Matrix<N, N, S> left = a;
-  Vector<N, S> sigma = room<N, 1, S>(n, 1), waits = sigma;
+  Room<S, N == dynamic ? dynamic : 2 * N> numbers(2 * n);
   result.root = a;
   result.order = room<N, 1, int>(n, 1);
-  result.rank = pivot_root(view(left), view(result.root), view(result.order), view(sigma), view(waits));
+  result.rank = pivot_root(view(left), view(result.root), result.order.data(), numbers.data(),
+                           numbers.data() + n);
   return result.rank >= 0;
 }
 
-/// Householder: makes the C x R matrix `a` upper triangular in its first R rows, a^T a unchanged, diagonal
-/// not negative. C >= R. An error of rounding is one of each column by itself, so that columns may differ in
-/// size (Higham, 2002, theorem 19.4).
+/// Numbers of room that the functions below ask for, which need a matrix of n rows to be looked at.
+[[nodiscard]] constexpr int room_for_root(int n) {
+  return n == dynamic ? dynamic : 2 * n * (n + 1);
+}
+
+/// Symmetric `a` is finite and positive semi-definite up to the rounding of its own diagonal.
+template <class S>
+[[nodiscard, gnu::cold, gnu::noinline]] bool is_semi_definite(ViewOf<S> a, S* numbers) {
+  const int n = a.rows();
+  const View<S> left(numbers, n, n), root(numbers + n * n, n, n);
+  for (int j = 0; j < n; ++j)
+    for (int i = j; i < n; ++i) left(i, j) = a(i, j);
+  return pivot_root(left, root, nullptr, numbers + 2 * n * n, numbers + 2 * n * n + n) >= 0;
+}
+template <int N, class S>
+[[nodiscard, gnu::cold, gnu::noinline]] bool is_semi_definite(const Matrix<N, N, S>& a) {
+  const int n = static_cast<int>(a.rows());
+  Room<S, room_for_root(N)> numbers(room_for_root(n));
+  return is_semi_definite(view(a), numbers.data());
+}
+
 template <class A>
-void triangularise(A&& a) {
+[[gnu::always_inline]] inline void reflect_columns(A& a) {
   using S = std::remove_cvref_t<decltype(a(0, 0))>;
   using std::sqrt;
   const int rows = static_cast<int>(a.rows());
@@ -167,6 +226,19 @@ void triangularise(A&& a) {
     a(k, k) = norm;
     for (int i = k + 1; i < rows; ++i) a(i, k) = S(0);
   }
+}
+
+/// Householder: makes the C x R matrix `a` upper triangular in its first R rows, a^T a unchanged, diagonal
+/// not negative. C >= R. An error of rounding is one of each column by itself, so that columns may differ in
+/// size (Higham, 2002, theorem 19.4).
+template <class A>
+void triangularise(A&& a) {
+  reflect_columns(a);
+}
+/// The same, compiled once for all sizes.
+template <class S>
+[[gnu::noinline]] void triangularise(View<S> a) {
+  reflect_columns(a);
 }
 
 /// Householder on the first `count` columns, where some may depend on others: rows(j) is the row in which
@@ -250,18 +322,32 @@ template <int N, class S>
 }
 
 /// Lower triangular root of any positive semi-definite `a`; false where it is none.
+template <class S>
+[[nodiscard, gnu::cold, gnu::noinline]] bool singular_root(ViewOf<S> a, View<S> root, S* numbers) {
+  const int n = a.rows();
+  const View<S> pivoted(numbers + n * n, n, n);
+  const View<S> array(numbers, n, n);
+  for (int j = 0; j < n; ++j)
+    for (int i = j; i < n; ++i) array(i, j) = a(i, j);
+  if (pivot_root(array, pivoted, nullptr, numbers + 2 * n * n, numbers + 2 * n * n + n) < 0) return false;
+  put_transposed(array, 0, 0, pivoted);
+  triangularise(array);
+  take_lower_part(root, array, 0);
+  return true;
+}
 template <int N, class S>
 [[nodiscard, gnu::cold, gnu::noinline]] bool singular_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& root) {
-  PivotedRoot<N, S> pivoted;
-  if (!pivoted_root<N, S>(a, pivoted)) return false;
-  Matrix<N, N, S> array = transposed<N, N, S>(pivoted.root);
+  const int n = static_cast<int>(a.rows());
+  Room<S, room_for_root(N)> numbers(room_for_root(n));
   root = a;
-  triangularise(view(array));
-  take_lower_part(view(root), view(array), 0);
-  return true;
+  return singular_root(view(a), view(root), numbers.data());
 }
 
 /// The same, the quick way first; compiled once for all sizes.
+template <class S>
+[[nodiscard, gnu::noinline]] bool rare_root(ViewOf<S> a, View<S> root, S* numbers) {
+  return eliminate_root(a, root) || singular_root(a, root, numbers);
+}
 template <int N, class S>
 [[nodiscard]] bool rare_root(const Matrix<N, N, S>& a, Matrix<N, N, S>& root) {
   root = a;

@@ -84,7 +84,7 @@ template <Manifold X, int M, class Array>
     in.status = finite_numbers ? Status::not_positive_definite : Status::not_finite;
   if (in.status != Status::accepted) return in;
   const auto update = update_by_array<dof<X>, M, S>(array, residual, static_cast<int>(belief.root.rows()));
-  in.status = judge_array(update, in, gate);
+  in.status = judge_array<Wanted::always>(update, in, gate);
   if (in.status == Status::accepted &&
       !determined<dof<X>, M, S>(update, belief.root, h, r, KeptAs::root, digits))
     in.status = Status::not_positive_definite;

@@ -209,7 +209,7 @@ private:
     detail::put_transposed(array, M, M, root);
     const auto update = detail::update_by_array<N, M, S, detail::Wanted::rarely>(array, in.residual, N);
     constexpr double no_gate = std::numeric_limits<double>::infinity();
-    const Status status = detail::judge_array(update, in, no_gate);
+    const Status status = detail::judge_array<detail::Wanted::rarely>(update, in, no_gate);
     if (status != Status::accepted) return status;
     if (!detail::determined<N, M, S, detail::Wanted::rarely>(update, root, h, r, detail::KeptAs::root))
       return Status::not_positive_definite;

@@ -199,24 +199,22 @@ private:
       using Z = typename H::Measurement;
       constexpr int n = dof<X>;
       const int ns = static_cast<int>(belief.covariance.rows()), ms = static_cast<int>(in.residual.size());
+      constexpr bool fixed = n != dynamic && M != dynamic;
+      constexpr int of_array = fixed ? (2 * n + 1 + M) * (M + n) : dynamic;
       CovarianceOf<X> root = belief.covariance;
-      Matrix<M, M, S> root_r = r;
-      if (!detail::rare_root<n, S>(belief.covariance, root) || !detail::rare_root<M, S>(r, root_r))
-        return Status::not_positive_definite;
-      constexpr int rows = n == dynamic || M == dynamic ? dynamic : 2 * n + 1 + M;
-      constexpr int size = detail::size_sum<M, n>;
-      Matrix<rows, size, S> array = Matrix<rows, size, S>::Zero(2 * ns + 1 + ms, ms + ns);
+      if (!detail::rare_root<n, S>(belief.covariance, root)) return Status::not_positive_definite;
+      detail::Room<S, of_array> room_of_array((2 * ns + 1 + ms) * (ms + ns));
+      detail::View<S> array(room_of_array.data(), 2 * ns + 1 + ms, ms + ns);
       static_cast<void>(detail::sigma_rows(
           belief.mean, root, [&](const X& x) -> Z { return sensor.predict(x); }, c2, beta_minus_alpha2(),
           array));
-      detail::put_transposed(array, 0, ms, root);
-      detail::put_transposed(array, 2 * ns + 1, 0, root_r);
-      if (!all_finite(array)) return Status::not_positive_definite;
-      const Matrix<M, n, S> slope = detail::mean_slope<M, n, S>(array, root, ms);
-      update = detail::update_by_array<n, M, S, detail::Wanted::rarely>(array, in.residual, ns);
-      const bool good = update.regular && detail::determined<n, M, S, detail::Wanted::rarely>(
-                                              update, root, slope, r, detail::KeptAs::covariance, digits);
-      return good ? Status::accepted : Status::not_positive_definite;
+      if constexpr (!fixed) update = detail::ArrayUpdate<n, M, S>(ns, ms);
+      Vector<M, S> y = in.residual;
+      detail::Room<S, detail::room_by_points(n, M)> numbers(detail::room_by_points(ns, ms));
+      return detail::update_by_points<S>(array, detail::view(root), detail::view(r),
+                                         detail::view(update.root_s), detail::view(update.root),
+                                         detail::view(update.white), detail::view(update.step),
+                                         detail::view(y), digits, update, numbers.data());
     };
   }
 

@@ -23,10 +23,12 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/detail/array_update.hpp>
 #include <cairn/filter/detail/covariance.hpp>
 #include <cairn/filter/detail/products.hpp>
 #include <cairn/filter/detail/sigma_moments.hpp>
 #include <cairn/filter/gaussian.hpp>
+#include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
@@ -125,19 +127,22 @@ template <Manifold X, class F, class Array>
   const int n = static_cast<int>(root.rows());
   const S c = spread<S>(c2);
   const Y center = f(x);
-  Tangent<Y> mean = Tangent<Y>::Zero(dof_of(center));
+  const int m = dof_of(center);
+  Tangent<Y> mean = room<dof<Y>, 1, S>(m, 1);
+  for (int k = 0; k < m; ++k) mean(k) = S(0);
+  Tangent<X> step = room<dof<X>, 1, S>(n, 1);
   for (int i = 0; i < n; ++i) {
-    Tangent<X> step = c * root.col(i);
+    for (int k = 0; k < n; ++k) step(k) = c * root(k, i);
     const Tangent<Y> up = local(center, Y(f(retract(x, step))));
-    step = -step;
+    for (int k = 0; k < n; ++k) step(k) = -step(k);
     const Tangent<Y> down = local(center, Y(f(retract(x, step))));
     Tangent<Y> odd = up, even = down;
-    for (int k = 0; k < static_cast<int>(mean.size()); ++k) {
+    for (int k = 0; k < m; ++k) {
       odd(k) = S(0.5) * (up(k) - down(k));
       even(k) = S(0.5) * (up(k) + down(k));
     }
     drop_noise<Y>(center, odd, even);
-    for (int k = 0; k < static_cast<int>(mean.size()); ++k) {
+    for (int k = 0; k < m; ++k) {
       rows(i, k) = odd(k) / c;
       rows(n + i, k) = even(k) / c;
       mean(k) += even(k) / (c * c);
@@ -146,7 +151,7 @@ template <Manifold X, class F, class Array>
   const S of_mean = static_cast<S>(beta_minus_alpha2);
   const S share = of_mean < S(0) ? -of_mean * static_cast<S>(n) / (c * c) : S(0);
   const bool shared = share > S(0) && share <= S(1) + S(8) * std::numeric_limits<S>::epsilon();
-  for (int k = 0; k < static_cast<int>(mean.size()); ++k) {
+  for (int k = 0; k < m; ++k) {
     rows(2 * n, k) = mean(k) == S(0) || shared ? S(0) : sqrt(of_mean) * mean(k);
     if (!shared) continue;
     const S rest = share < S(1) ? S(1) - share : S(0);
@@ -180,19 +185,53 @@ template <Manifold X, Manifold Y, class P, class Q>
 
 /// The mean slope H of a function over the points, m x n: H root is the transpose of the first n rows from
 /// `column` on, the odd ones of sigma_rows(). No slope in a direction without variance. O(n^2 m).
+template <class Array, class Root, class Slope>
+void fill_slope(const Array& rows, const Root& root, Slope&& slope, int column) {
+  using S = std::remove_cvref_t<decltype(slope(0, 0))>;
+  const int n = static_cast<int>(root.rows());
+  for (int j = 0; j < static_cast<int>(slope.rows()); ++j)
+    for (int k = n - 1; k >= 0; --k) {
+      S sum = rows(k, column + j);
+      for (int i = k + 1; i < n; ++i) sum -= slope(j, i) * root(i, k);
+      slope(j, k) = root(k, k) > S(0) ? S(sum / root(k, k)) : S(0);
+    }
+}
 template <int M, int N, class S, class Array>
 [[nodiscard]] Matrix<M, N, S> mean_slope(const Array& rows, const Matrix<N, N, S>& root, int m,
                                          int column = 0) {
-  const int n = static_cast<int>(root.rows());
-  Matrix<M, N, S> slope = Matrix<M, N, S>::Zero(m, n);
-  for (int j = 0; j < m; ++j)
-    for (int k = n - 1; k >= 0; --k) {
-      if (!(root(k, k) > S(0))) continue;
-      S sum = rows(k, column + j);
-      for (int i = k + 1; i < n; ++i) sum -= slope(j, i) * root(i, k);
-      slope(j, k) = sum / root(k, k);
-    }
+  Matrix<M, N, S> slope = room<M, N, S>(m, static_cast<int>(root.rows()));
+  fill_slope(rows, root, slope, column);
   return slope;
+}
+
+/// The update of a filter by points, from the rows of sigma_rows() in the first columns of `array`, which is
+/// used up, and the prior's root: the array of square_root.hpp, compiled once for all sizes. Fills what
+/// update_by_array() returns, whitens `y`, the residual. `numbers` is room for room_by_points().
+[[nodiscard]] constexpr int room_by_points(int n, int m) {
+  if (n == dynamic || m == dynamic) return dynamic;
+  return m * m + m * n + room_for_root(m) + room_to_judge(n, m);
+}
+template <class S>
+[[nodiscard, gnu::cold, gnu::noinline]] Status update_by_points(View<S> array, ViewOf<S> root, ViewOf<S> r,
+                                                                View<S> root_s, View<S> updated,
+                                                                View<S> white, View<S> step, View<S> y,
+                                                                S digits, ArrayVerdict<S>& verdict,
+                                                                S* numbers) {
+  const int n = root.rows(), m = r.rows();
+  const View<S> root_r(numbers, m, m), slope(numbers + m * m, m, n);
+  S* const free = numbers + m * m + m * n;
+  if (!rare_root(r, root_r, free)) return Status::not_positive_definite;
+  for (int j = 0; j < m + n; ++j)
+    for (int i = 0; i < array.rows(); ++i) {
+      if (i > 2 * n) array(i, j) = j < m ? root_r(j, i - 2 * n - 1) : S(0);
+      if (i <= 2 * n && j >= m) array(i, j) = i < n ? root(j - m, i) : S(0);
+    }
+  if (!finite_numbers<S>(array)) return Status::not_positive_definite;
+  fill_slope(array, root, slope, 0);
+  verdict = read_array(array, root_s, updated, white, step, y);
+  const bool good = verdict.regular && is_determined<S>(root, slope, r, root_s, updated, white,
+                                                        KeptAs::covariance, digits, free);
+  return good ? Status::accepted : Status::not_positive_definite;
 }
 
 }  // namespace detail

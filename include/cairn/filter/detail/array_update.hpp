@@ -41,24 +41,36 @@ template <int N, class S>
   square(root, a);
   return a;
 }
+/// The same, compiled once for all sizes.
+template <int N, class S>
+[[nodiscard]] Matrix<N, N, S> rare_square(const Matrix<N, N, S>& root) {
+  Matrix<N, N, S> a = root;
+  square(view(root), view(a));
+  return a;
+}
 
-/// The parts of a triangularised array.
-template <int N, int M, class S>
-struct ArrayUpdate {
-  Matrix<M, M, S> root_s;  ///< lower triangular, S = root_s root_s^T
-  Matrix<N, N, S> root;    ///< lower triangular, of the updated covariance
-  Matrix<N, M, S> white;   ///< K root_s = P H^T root_s^-T
-  Vector<N, S> step;
+/// What an array's update comes to beside its matrices.
+template <class S>
+struct ArrayVerdict {
   S nis = S(0);
   S log_determinant = std::numeric_limits<S>::quiet_NaN();  ///< of S where S itself has lost it, else NaN
   bool regular = true;                                      ///< S has an inverse
 };
 
-/// What an array's update comes to beside its matrices.
-template <class S>
-struct ArrayVerdict {
-  S nis = S(0), log_determinant = std::numeric_limits<S>::quiet_NaN();
-  bool regular = true;
+/// The parts of a triangularised array.
+template <int N, int M, class S>
+struct ArrayUpdate : ArrayVerdict<S> {
+  Matrix<M, M, S> root_s;  ///< lower triangular, S = root_s root_s^T
+  Matrix<N, N, S> root;    ///< lower triangular, of the updated covariance
+  Matrix<N, M, S> white;   ///< K root_s = P H^T root_s^-T
+  Vector<N, S> step;
+
+  ArrayUpdate() = default;
+  ArrayUpdate(int n, int m)
+      : root_s(room<M, M, S>(m, m)),
+        root(room<N, N, S>(n, n)),
+        white(room<N, M, S>(n, m)),
+        step(room<N, 1, S>(n, 1)) {}
 };
 
 /// Triangularises `array`, which is used up, and fills the parts. `y` is the residual, whitened on return.
@@ -97,7 +109,7 @@ template <class Array, class RootS, class Root, class White, class Step, class Y
 
 /// [R^1/2  H L; 0  L]^T from H, L and R^1/2.
 template <class S>
-[[gnu::noinline]] void fill_array(View<S> array, View<const S> h, View<S> root, View<S> root_r) {
+[[gnu::noinline]] void fill_array(View<S> array, ViewOf<S> h, ViewOf<S> root, ViewOf<S> root_r) {
   const int n = root.rows(), m = root_r.rows();
   for (int j = 0; j < m + n; ++j)
     for (int i = 0; i < m; ++i) array(i, j) = j < m ? root_r(j, i) : S(0);
@@ -119,18 +131,14 @@ enum class Wanted { always, rarely };
 template <int N, int M, class S, Wanted When = Wanted::always, class Array>
 [[nodiscard]] ArrayUpdate<N, M, S> update_by_array(Array& array, const Vector<M, S>& residual, int n) {
   const int m = static_cast<int>(residual.size());
-  ArrayUpdate<N, M, S> out{room<M, M, S>(m, m), room<N, N, S>(n, n), room<N, M, S>(n, m),
-                           room<N, 1, S>(n, 1)};
+  ArrayUpdate<N, M, S> out(n, m);
   Vector<M, S> y = residual;
-  ArrayVerdict<S> verdict;
+  ArrayVerdict<S>& verdict = out;
   if constexpr (When == Wanted::always)
     verdict = read_array(array, out.root_s, out.root, out.white, out.step, y);
   else
     verdict =
         read_array(view(array), view(out.root_s), view(out.root), view(out.white), view(out.step), view(y));
-  out.nis = verdict.nis;
-  out.log_determinant = verdict.log_determinant;
-  out.regular = verdict.regular;
   return out;
 }
 
@@ -197,30 +205,88 @@ template <class Lower, class R, class RootS, class Root, class Gain, class White
   return true;
 }
 
+/// The same in views, compiled once for all sizes. `numbers` is room for room_to_judge().
+[[nodiscard]] constexpr int room_to_judge(int n, int m) {
+  return n == dynamic || m == dynamic ? dynamic : m * n + m * m + n;
+}
+template <class S>
+[[nodiscard, gnu::noinline]] bool is_determined(ViewOf<S> lower, ViewOf<S> h, ViewOf<S> r, ViewOf<S> root_s,
+                                                ViewOf<S> root, ViewOf<S> gain, KeptAs kept, S digits,
+                                                S* numbers) {
+  const int n = lower.rows(), m = h.rows();
+  const View<S> white(numbers, m, n), noise(numbers + m * n, m, m), sigma(numbers + m * n + m * m, n, 1);
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < m; ++i) white(i, j) = h(i, j);
+  return is_determined(lower, r, root_s, root, gain, white, noise, sigma, kept, digits);
+}
+
 /// The same for an array's update.
 template <int N, int M, class S, Wanted When = Wanted::always>
 [[nodiscard]] bool determined(const ArrayUpdate<N, M, S>& update, const Matrix<N, N, S>& lower,
                               const Matrix<M, N, S>& h, const Matrix<M, M, S>& r, KeptAs kept,
                               S digits = root_digits_left<S>) {
   const int n = static_cast<int>(lower.rows()), m = static_cast<int>(h.rows());
-  Matrix<M, N, S> white = h;
-  Matrix<M, M, S> noise = room<M, M, S>(m, m);
-  Vector<N, S> sigma = room<N, 1, S>(n, 1);
-  if constexpr (When == Wanted::always)
+  if constexpr (When == Wanted::always) {
+    Matrix<M, N, S> white = h;
+    Matrix<M, M, S> noise = room<M, M, S>(m, m);
+    Vector<N, S> sigma = room<N, 1, S>(n, 1);
     return is_determined(lower, r, update.root_s, update.root, update.white, white, noise, sigma, kept,
                          digits);
-  else
-    return is_determined(view(lower), view(r), view(update.root_s), view(update.root), view(update.white),
-                         view(white), view(noise), view(sigma), kept, digits);
+  } else {
+    Room<S, room_to_judge(N, M)> numbers(room_to_judge(n, m));
+    return is_determined<S>(view(lower), view(h), view(r), view(update.root_s), view(update.root),
+                            view(update.white), kept, digits, numbers.data());
+  }
+}
+
+/// The update by an array from P, H and R themselves, compiled once for all sizes: fills what update_by_array()
+/// returns, whitens `y`, the residual. `numbers` is room for room_for_roots().
+[[nodiscard]] constexpr int room_for_roots(int n, int m) {
+  if (n == dynamic || m == dynamic) return dynamic;
+  return n * n + m * m + (n + m) * (n + m) + room_for_root(n > m ? n : m) + room_to_judge(n, m);
+}
+template <class S>
+[[nodiscard, gnu::cold, gnu::noinline]] Status update_by_roots(ViewOf<S> prior, ViewOf<S> h, ViewOf<S> r,
+                                                               View<S> root_s, View<S> updated,
+                                                               View<S> white, View<S> step, View<S> y,
+                                                               ArrayVerdict<S>& verdict, S* numbers) {
+  const int n = prior.rows(), m = h.rows();
+  const View<S> root(numbers, n, n), root_r(numbers + n * n, m, m),
+      array(numbers + n * n + m * m, n + m, n + m);
+  S* const free = numbers + n * n + m * m + (n + m) * (n + m);
+  if (!rare_root(prior, root, free) || !rare_root(r, root_r, free)) return Status::not_positive_definite;
+  fill_array(array, h, root, root_r);
+  verdict = read_array(array, root_s, updated, white, step, y);
+  const bool good = verdict.regular && is_determined<S>(root, h, r, root_s, updated, white,
+                                                        KeptAs::covariance, root_digits_left<S>, free);
+  return good ? Status::accepted : Status::not_positive_definite;
+}
+template <int N, int M, class S>
+[[nodiscard]] Status update_by_roots(const Matrix<N, N, S>& prior, const Matrix<M, N, S>& h,
+                                     const Matrix<M, M, S>& r, const Vector<M, S>& residual,
+                                     ArrayUpdate<N, M, S>& update) {
+  const int n = static_cast<int>(prior.rows()), m = static_cast<int>(residual.size());
+  if constexpr (N == dynamic || M == dynamic) update = ArrayUpdate<N, M, S>(n, m);
+  Vector<M, S> y = residual;
+  Room<S, room_for_roots(N, M)> numbers(room_for_roots(n, m));
+  return update_by_roots<S>(view(prior), view(h), view(r), view(update.root_s), view(update.root),
+                            view(update.white), view(update.step), view(y), update, numbers.data());
 }
 
 /// Takes an array's update over into the innovation, and says whether it may be kept.
-template <int N, int M, class S>
+template <Wanted When, int N, int M, class S>
 [[nodiscard]] Status judge_array(const ArrayUpdate<N, M, S>& update, Innovation<M, S>& in, double gate) {
-  in.covariance = squared_root<M, S>(update.root_s);
+  bool finite_parts = false;
+  if constexpr (When == Wanted::always) {
+    in.covariance = squared_root<M, S>(update.root_s);
+    finite_parts = all_finite(update.root) && all_finite(update.step);
+  } else {
+    square(view(update.root_s), view(in.covariance));
+    finite_parts = finite_numbers(view(update.root)) && finite_numbers(view(update.step));
+  }
   in.nis = update.nis;
   in.log_determinant = update.log_determinant;
-  if (!update.regular || !all_finite(update.root) || !all_finite(update.step)) {
+  if (!update.regular || !finite_parts) {
     in.nis = S(0);
     return Status::not_positive_definite;
   }

@@ -54,16 +54,13 @@ template <int N, class S>
 [[nodiscard]] inline bool is_covariance(const Matrix<N, N, S>& a) {
   Column<N, S> work[N];
   load_columns(a, work);
-  if (is_regular(work)) return true;
-  PivotedRoot<N, S> root;
-  return pivoted_root<N, S>(a, root);
+  return is_regular(work) || is_semi_definite<N, S>(a);
 }
 template <int N, class S>
 [[nodiscard, gnu::cold, gnu::noinline]] bool is_semi_definite(const Column<N, S> (&p)[N]) {
   Matrix<N, N, S> a;
-  PivotedRoot<N, S> root;
   for (int j = 0; j < N; ++j) p[j].store(a.data() + j * N);
-  return pivoted_root<N, S>(a, root);
+  return is_semi_definite<N, S>(a);
 }
 template <int N, class S>
 [[gnu::always_inline]] [[nodiscard]] inline bool is_covariance(const Column<N, S> (&p)[N]) {
@@ -120,9 +117,8 @@ template <int N, class S>
   if constexpr (N != dynamic) {
     return is_covariance<N, S>(a);
   } else {
-    Matrix<N, N, S> lower;
-    PivotedRoot<N, S> root;
-    return regular_root<N, S>(a, lower) || pivoted_root<N, S>(a, root);
+    Matrix<N, N, S> lower = a;
+    return eliminate_root(view(a), view(lower)) || is_semi_definite<N, S>(a);
   }
 }
 

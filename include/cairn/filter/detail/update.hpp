@@ -73,43 +73,30 @@ template <int M, class S>
   return result;
 }
 
+/// What forbids an update that was not simply sound at once, if anything. Compiled once for all sizes.
+template <class S>
+[[nodiscard, gnu::cold, gnu::noinline]] Status refused_at_once(ViewOf<S> residual, ViewOf<S> covariance,
+                                                               ViewOf<S> prior, double gate, S nis) {
+  if (!(gate > 0.0)) return Status::bad_option;
+  if (!finite_numbers<S>(residual) || !finite_numbers<S>(covariance) || !finite_numbers<S>(prior))
+    return Status::not_finite;
+  return nis > static_cast<S>(gate) ? Status::gated : Status::accepted;
+}
+
 /// An update that was not simply sound: says why it is refused, or does it again by again(), which fills an
 /// array for update_by_array() and returns its result or the status that forbids it. `sound` where S kept its
 /// digits, so that its NIS is right. Off the hot path.
-template <int N, int M, class S, class Prior, class Again>
-[[gnu::cold, gnu::noinline]] void reconsider(Candidate<N, M, S>& out, const Prior& prior, double gate,
-                                             bool sound, const Again& again) {
+template <int N, int M, class S, class Again>
+[[gnu::cold, gnu::noinline]] void reconsider(Candidate<N, M, S>& out, const Matrix<N, N, S>& prior,
+                                             double gate, bool sound, const Again& again) {
   Innovation<M, S>& in = out.innovation;
-  if (!(gate > 0.0)) {
-    in.status = Status::bad_option;
-  } else if (!all_finite(in.residual) || !all_finite(in.covariance) || !all_finite(prior)) {
-    in.status = Status::not_finite;
-  } else if (sound && in.nis > static_cast<S>(gate)) {
-    in.status = Status::gated;
-  } else {
-    ArrayUpdate<N, M, S> update;
-    in.status = again(update);
-    if (in.status == Status::accepted) in.status = judge_array(update, in, gate);
-    if (in.status == Status::accepted) out.take(update.step, squared_root<N, S>(update.root));
-  }
-}
-
-/// The update by an array from P, H and R themselves.
-template <int N, int M, class S>
-[[nodiscard]] Status update_by_roots(const Matrix<N, N, S>& prior, const Matrix<M, N, S>& h,
-                                     const Matrix<M, M, S>& r, const Vector<M, S>& residual,
-                                     ArrayUpdate<N, M, S>& update) {
-  const int n = static_cast<int>(prior.rows()), m = static_cast<int>(residual.size());
-  Matrix<N, N, S> root = prior;
-  Matrix<M, M, S> root_r = r;
-  if (!rare_root<N, S>(prior, root) || !rare_root<M, S>(r, root_r)) return Status::not_positive_definite;
-  constexpr int size = size_sum<N, M>;
-  Matrix<size, size, S> array = room<size, size, S>(m + n, m + n);
-  fill_array(view(array), view(h), view(root), view(root_r));
-  update = update_by_array<N, M, S, Wanted::rarely>(array, residual, n);
-  const bool good =
-      update.regular && determined<N, M, S, Wanted::rarely>(update, root, h, r, KeptAs::covariance);
-  return good ? Status::accepted : Status::not_positive_definite;
+  in.status = refused_at_once<S>(view(in.residual), view(in.covariance), view(prior), gate,
+                                 sound ? in.nis : S(0));
+  if (in.status != Status::accepted) return;
+  ArrayUpdate<N, M, S> update;
+  in.status = again(update);
+  if (in.status == Status::accepted) in.status = judge_array<Wanted::rarely>(update, in, gate);
+  if (in.status == Status::accepted) out.take(update.step, rare_square<N, S>(update.root));
 }
 
 template <int N, int M, class S, class H>
@@ -291,8 +278,12 @@ template <Manifold X, int M, class H>
 /// What is the matter with a noise that does not look like a covariance at first sight, if anything.
 template <int N, class S>
 [[nodiscard, gnu::cold, gnu::noinline]] Status judge_noise(const Matrix<N, N, S>& q) {
-  if (!all_finite(q)) return Status::not_finite;
-  return is_valid_covariance<N, S>(q) ? Status::accepted : Status::not_positive_definite;
+  if (!finite_numbers<S>(view(q))) return Status::not_finite;
+  if constexpr (N == dynamic) {
+    return is_valid_covariance<N, S>(q) ? Status::accepted : Status::not_positive_definite;
+  } else {
+    return is_semi_definite<N, S>(q) ? Status::accepted : Status::not_positive_definite;
+  }
 }
 
 /// At first sight: the noise is a covariance. False says only that judge_noise() must look. Zeros that are
@@ -329,8 +320,8 @@ template <Manifold X>
 [[nodiscard]] Status stabilise(CovarianceOf<X>& q, double fading, double stabilising_noise) {
   using S = ScalarOf<X>;
   if (!(fading >= 1.0) || !(stabilising_noise >= 0.0)) return Status::bad_option;
-  const Status status = judge_noise<dof<X>, S>(q);
-  if (status != Status::accepted) return status;
+  if (!is_valid_covariance<dof<X>, S>(q)) [[unlikely]]
+    if (const Status status = judge_noise<dof<X>, S>(q); status != Status::accepted) return status;
   for (int i = 0; i < static_cast<int>(q.rows()); ++i) q(i, i) += static_cast<S>(stabilising_noise);
   return all_finite(q) ? Status::accepted : Status::not_finite;
 }
