@@ -12,6 +12,7 @@
 #include <cairn/core/counted.hpp>
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/core/ode.hpp>
 #include <cairn/core/parallel.hpp>
 #include <cairn/core/random.hpp>
 #include <cairn/core/sizes.hpp>

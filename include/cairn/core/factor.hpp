@@ -172,8 +172,8 @@ template <int N, class S>
   Room<S, N == dynamic ? dynamic : 2 * N> numbers(2 * n);
   result.root = a;
   result.order = room<N, 1, int>(n, 1);
-  result.rank = pivot_root(view(left), view(result.root), result.order.data(), numbers.data(),
-                           numbers.data() + n);
+  result.rank =
+      pivot_root(view(left), view(result.root), result.order.data(), numbers.data(), numbers.data() + n);
   return result.rank >= 0;
 }
 

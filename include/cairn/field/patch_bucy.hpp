@@ -9,8 +9,8 @@
 /// with H = dh/dX at the estimate, S = S_0 I the spectral density of the samples' noise and Q that of the
 /// states' (zero in the document, whose A has the other sign). filter/kalman_bucy.hpp is the same filter for
 /// any sensor in fixed steps; this one knows that a frame is a thousand samples of one field. Integrated by
-/// the pair of orders 5 and 4 of J. Dormand, P. Prince ("A family of embedded Runge-Kutta formulae", 1980)
-/// with step control: the gain is large at the start and falls like 1/t, so no fixed step serves both ends.
+/// DormandPrince of core/ode.hpp, with step control: the gain is large at the start and falls like 1/t, so no
+/// fixed step serves both ends.
 ///
 /// A frame that arrives at one instant is an impulse: (1) and (2) without the motion over a unit of
 /// artificial time, with the frame's covariance in place of S. In the linear case that is exactly the Kalman
@@ -19,7 +19,6 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <span>
@@ -27,6 +26,7 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/core/ode.hpp>
 #include <cairn/field/patch.hpp>
 #include <cairn/field/patch_gram.hpp>
 #include <cairn/field/patch_model.hpp>
@@ -39,58 +39,6 @@
 namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
-
-/// Integrates y' = slope(t, y) from t to end in place. `scales(y)` gives the size of y that an error is
-/// compared with; slope returns false to give up. Returns the number of steps, or 0 on failure.
-template <class Vec, class Slope, class Scales>
-int dormand_prince(Vec& y, double t, double end, double tolerance, int most_steps, Slope&& slope,
-                   Scales&& scales) {
-  static constexpr double c[7] = {0, 1.0 / 5, 3.0 / 10, 4.0 / 5, 8.0 / 9, 1, 1};
-  static constexpr double a[7][6] = {
-      {},
-      {1.0 / 5},
-      {3.0 / 40, 9.0 / 40},
-      {44.0 / 45, -56.0 / 15, 32.0 / 9},
-      {19372.0 / 6561, -25360.0 / 2187, 64448.0 / 6561, -212.0 / 729},
-      {9017.0 / 3168, -355.0 / 33, 46732.0 / 5247, 49.0 / 176, -5103.0 / 18656},
-      {35.0 / 384, 0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84}};
-  static constexpr double difference[7] = {71.0 / 57600,      0,          -71.0 / 16695, 71.0 / 1920,
-                                           -17253.0 / 339200, 22.0 / 525, -1.0 / 40};
-  std::array<Vec, 7> k;
-  if (!slope(t, y, k[0])) return 0;
-  double step = (end - t) / 16.0;
-  for (int steps = 1; steps <= most_steps; ++steps) {
-    step = std::min(step, end - t);
-    Vec next;
-    bool good = true;
-    for (std::size_t stage = 1; stage < 7 && good; ++stage) {
-      next = y;
-      for (std::size_t j = 0; j < stage; ++j)
-        for (int i = 0; i < y.size(); ++i) next(i) += step * a[stage][j] * k[j](i);
-      good = slope(t + c[stage] * step, next, k[stage]);
-    }
-    double worst = 1e3;
-    if (good) {
-      const Vec scale = scales(y);
-      worst = 0.0;
-      for (int i = 0; i < y.size(); ++i) {
-        double error = 0;
-        for (std::size_t j = 0; j < 7; ++j) error += step * difference[j] * k[j](i);
-        const double share = std::abs(error) / (scale(i) * tolerance);
-        worst = std::max(worst, share < 1e4 ? share : 1e4);  // NaN too is a step too long
-      }
-    }
-    if (worst <= 1.0) {
-      t += step;
-      y = next;
-      k[0] = k[6];  // the last stage is the first of the next step
-      if (!(t < end - 1e-12 * std::abs(end))) return steps;
-    }
-    step *= std::clamp(0.9 * std::pow(std::max(worst, 1e-10), -0.2), 0.2, 5.0);
-    if (!(std::abs(step) > 1e-14 * std::max(std::abs(t), std::abs(end)))) return 0;
-  }
-  return 0;
-}
 
 /// Mean and information matrix as one vector, which is what is integrated.
 template <int N>
@@ -233,8 +181,9 @@ PatchVerdict PatchBucy::integrate(Gaussian<typename Placement::State>& belief, c
     if (moved.misfit()) verdict = PatchVerdict::size_mismatch;
     return verdict == PatchVerdict::accepted;
   };
-  const bool arrived =
-      detail::dormand_prince(y, t, end, tolerance, most_steps, slope, detail::error_scales<N>) != 0;
+  const bool arrived = DormandPrince{.tolerance = tolerance, .most_steps = most_steps}
+                           .integrate(y, t, end, slope, detail::error_scales<N>)
+                           .arrived;
   if (!arrived && verdict != PatchVerdict::accepted) return verdict;
   return arrived && detail::unpack_belief(y, belief) ? PatchVerdict::accepted
                                                      : PatchVerdict::not_positive_definite;

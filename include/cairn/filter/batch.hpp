@@ -111,7 +111,7 @@ struct BatchKalman {
     bool misfit = false;
     const Matrix<N, N, S> q = detail::plain_matrix<N, N, S>(noise, N, N, misfit);
     if (misfit) return Status::size_mismatch;
-    if (const Status status = detail::judge_noise<N, S>(q); status != Status::accepted) return status;
+    if (const Status status = detail::check_noise<N, S>(q); status != Status::accepted) return status;
     typename GaussianBatch<N, S>::Lane added[GaussianBatch<N, S>::triangle]{};
     for (int i = 0; i < N; ++i)
       for (int j = 0; j <= i; ++j) added[batch.place(i, j)] += q(i, j);
@@ -262,7 +262,7 @@ Status BatchKalman::predict(GaussianBatch<N, S>& batch, const F& f, const Q& noi
   const Matrix<N, N, S> q = detail::plain_matrix<N, N, S>(noise, N, N, misfit);
   if (misfit) return Status::size_mismatch;
   if (!all_finite(a)) return Status::not_finite;
-  if (const Status status = detail::judge_noise<N, S>(q); status != Status::accepted) return status;
+  if (const Status status = detail::check_noise<N, S>(q); status != Status::accepted) return status;
   for (auto& block : batch.blocks()) {
     Lane u[N][N];  // F P
     Lane x[N];

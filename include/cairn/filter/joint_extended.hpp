@@ -222,13 +222,6 @@ struct LinearisedAt {
   }
 };
 
-/// Why this R is no noise.
-template <int M, class S>
-[[nodiscard]] Status check_noise(const Matrix<M, M, S>& r) {
-  if (!all_finite(r)) return Status::not_finite;
-  return is_valid_covariance<M, S>(r) ? Status::accepted : Status::not_positive_definite;
-}
-
 /// A sensor seen from the prior: its answers at prior (+) step, the jacobian by the step from the prior.
 /// False where sizes do not fit. Of run-time size, so that what iterates is compiled once.
 template <class S>

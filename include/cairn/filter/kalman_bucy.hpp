@@ -9,10 +9,10 @@
 ///   x' = f(x, u) + K (z - h(x)),   P' = A P + P A^T + Q - K R K^T,   K = P H^T R^-1        (covariance)
 ///   Y' = -Y A - A^T Y - Y Q Y + H^T R^-1 H                                                 (information)
 /// (R. E. Kalman, R. S. Bucy, "New results in linear filtering and prediction theory", 1961), integrated by
-/// the classical Runge-Kutta rule in `steps` equal parts at first: each is done whole and in halves, and
-/// where the two differ by more than the tolerance the part is halved (E. Hairer, S. Norsett, G. Wanner,
-/// "Solving Ordinary Differential Equations I", II.4). An explicit rule needs a part for every few time
-/// constants of the filter. Measurements at instants go through Kalman, Extended or InformationFilter:
+/// the classical Runge-Kutta rule of core/ode.hpp in `steps` equal parts at first: each is done whole and in
+/// halves, and where the two differ by more than the tolerance the part is halved (E. Hairer, S. Norsett, G.
+/// Wanner, "Solving Ordinary Differential Equations I", II.4). An explicit rule needs a part for every few
+/// time constants of the filter. Measurements at instants go through Kalman, Extended or InformationFilter:
 /// together that is the continuous-discrete filter.
 ///
 /// ```cpp
@@ -32,6 +32,7 @@
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/core/ode.hpp>
 #include <cairn/filter/detail/covariance.hpp>
 #include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/detail/update.hpp>
@@ -152,7 +153,7 @@ private:
   static Status judge(const detail::PlainProcess<F, U>& process, const X& x) {
     const CovarianceOf<X> q = process.spectral_density(x);
     if (process.misfit()) return Status::size_mismatch;
-    return detail::judge_noise<dof<X>, ScalarOf<X>>(q);
+    return detail::check_noise<dof<X>, ScalarOf<X>>(q);
   }
   template <class H, class V, Manifold X>
   static Status judge(const detail::PlainSensor<H, V>& sensor, const X& x) {
@@ -169,6 +170,16 @@ private:
   template <Manifold X>
   struct Rates {
     Tangent<X> state;
+    CovarianceOf<X> matrix;
+
+    friend Rates operator+(const Rates& a, const Rates& b) {
+      return {a.state + b.state, a.matrix + b.matrix};
+    }
+    friend Rates operator*(const ScalarOf<X>& by, const Rates& a) { return {by * a.state, by * a.matrix}; }
+  };
+  template <Manifold X>
+  struct Moving {
+    X state;
     CovarianceOf<X> matrix;
   };
 
@@ -187,16 +198,13 @@ private:
   /// One part of the rule.
   template <Manifold X, class Rate>
   static void advance(X& x, CovarianceOf<X>& p, const Rate& rate, ScalarOf<X> h) {
-    using S = ScalarOf<X>;
-    const auto at = [&](const Rates<X>& k, S by) {
-      return rate(retract(x, Tangent<X>(by * k.state)), CovarianceOf<X>(p + by * k.matrix));
+    const auto slope = [&](ScalarOf<X>, const Moving<X>& at) { return rate(at.state, at.matrix); };
+    const auto move = [](const Moving<X>& from, const Rates<X>& by) {
+      return Moving<X>{retract(from.state, by.state), from.matrix + by.matrix};
     };
-    const Rates<X> k1 = rate(x, p);
-    const Rates<X> k2 = at(k1, h / S(2));
-    const Rates<X> k3 = at(k2, h / S(2));
-    const Rates<X> k4 = at(k3, h);
-    x = retract(x, Tangent<X>(h / S(6) * (k1.state + S(2) * (k2.state + k3.state) + k4.state)));
-    p = symmetrised(p + h / S(6) * (k1.matrix + S(2) * (k2.matrix + k3.matrix) + k4.matrix));
+    const Moving<X> to = runge_kutta_4(Moving<X>{x, p}, ScalarOf<X>(0), h, slope, move);
+    x = to.state;
+    p = symmetrised(to.matrix);
   }
 
   /// How far two results are apart, in standard deviations of the second; infinity where one is no number.

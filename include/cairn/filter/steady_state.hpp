@@ -91,7 +91,7 @@ template <int N, int M, class S>
       r.cols() != m)
     return refused(Status::size_mismatch);
   if (!all_finite(f) || !all_finite(h) || !all_finite(r)) return refused(Status::not_finite);
-  const Status noise = detail::judge_noise<N, S>(q);
+  const Status noise = detail::check_noise<N, S>(q);
   if (noise != Status::accepted) return refused(noise);
   const Cholesky<M, S> root_r(r);
   if (!root_r.good()) return refused(Status::not_positive_definite);

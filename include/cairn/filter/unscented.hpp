@@ -264,7 +264,7 @@ private:
     using S = ScalarOf<X>;
     CovarianceOf<X> root = belief.covariance;
     if (!detail::checked_root<dof<X>, S>(belief.covariance, root)) return refusal<X>(belief);
-    if (const Status status = detail::judge_noise<dof<X>, S>(q); status != Status::accepted) return status;
+    if (const Status status = detail::check_noise<dof<X>, S>(q); status != Status::accepted) return status;
     const auto next = detail::unscented_transform(
         belief.mean, root, [&](const X& x) -> X { return f(x); }, c2, beta_minus_alpha2());
     if (process.misfit()) return Status::size_mismatch;

@@ -239,16 +239,16 @@ template <int N, int M, class S, Wanted When = Wanted::always>
   }
 }
 
-/// The update by an array from P, H and R themselves, compiled once for all sizes: fills what update_by_array()
-/// returns, whitens `y`, the residual. `numbers` is room for room_for_roots().
+/// The update by an array from P, H and R themselves, compiled once for all sizes: fills what
+/// update_by_array() returns, whitens `y`, the residual. `numbers` is room for room_for_roots().
 [[nodiscard]] constexpr int room_for_roots(int n, int m) {
   if (n == dynamic || m == dynamic) return dynamic;
   return n * n + m * m + (n + m) * (n + m) + room_for_root(n > m ? n : m) + room_to_judge(n, m);
 }
 template <class S>
 [[nodiscard, gnu::cold, gnu::noinline]] Status update_by_roots(ViewOf<S> prior, ViewOf<S> h, ViewOf<S> r,
-                                                               View<S> root_s, View<S> updated,
-                                                               View<S> white, View<S> step, View<S> y,
+                                                               View<S> root_s, View<S> updated, View<S> white,
+                                                               View<S> step, View<S> y,
                                                                ArrayVerdict<S>& verdict, S* numbers) {
   const int n = prior.rows(), m = h.rows();
   const View<S> root(numbers, n, n), root_r(numbers + n * n, m, m),

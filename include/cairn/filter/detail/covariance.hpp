@@ -13,6 +13,7 @@
 #include <cairn/filter/detail/column_shapes.hpp>
 #include <cairn/filter/detail/products.hpp>
 #include <cairn/filter/detail/register_column.hpp>
+#include <cairn/filter/status.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
@@ -120,6 +121,20 @@ template <int N, class S>
     Matrix<N, N, S> lower = a;
     return eliminate_root(view(a), view(lower)) || is_semi_definite<N, S>(a);
   }
+}
+
+/// What is the matter with a noise that does not look like a covariance at first sight, if anything.
+template <int N, class S>
+[[nodiscard, gnu::cold, gnu::noinline]] Status judge_noise(const Matrix<N, N, S>& q) {
+  if (!finite_numbers<S>(view(q))) return Status::not_finite;
+  return is_semi_definite<N, S>(q) ? Status::accepted : Status::not_positive_definite;
+}
+
+/// Why this matrix is no noise, if it is none; in all likelihood it is one.
+template <int N, class S>
+[[nodiscard]] Status check_noise(const Matrix<N, N, S>& q) {
+  if (!all_finite(q)) return Status::not_finite;
+  return is_valid_covariance<N, S>(q) ? Status::accepted : Status::not_positive_definite;
 }
 
 /// The root of what is known to be a covariance.
