@@ -26,6 +26,19 @@
 ///   double reach() const;                                               // optional: of the sensor
 /// };
 /// ```
+///
+/// A sensor whose report can only be predicted with the sighting at hand, such as the distances of a
+/// segment's ends from a line, gives a model of that sighting: an ordinary sensor whose Measurement is those
+/// numbers, and what they should be.
+///
+/// ```cpp
+///   SegmentEnds of(const Measurement& z) const;  // predict, both Jacobians and noise of SegmentEnds,
+///                                                // and SegmentEnds::Measurement measured() const
+///   bool may_be(const State& x, const Measurement& z, const Part& m) const;  // optional: a cheap first look
+///   bool determines(const Measurement& z) const;  // optional: whether a landmark may begin with it
+///   void note(Part& m, const State& x, const Measurement& z) const;  // optional: what is not in the
+///   Gaussian
+/// ```
 #pragma once
 
 #include <algorithm>
@@ -38,6 +51,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -59,17 +73,48 @@
 
 namespace cairn { inline namespace CAIRN_ABI {
 
+namespace detail {
+
+/// What predicts a sighting, given it: the sensor itself, or what it makes of the sighting.
+template <class L>
+[[nodiscard]] decltype(auto) model_of(const L& sensor, const typename L::Measurement& z) {
+  if constexpr (requires { sensor.of(z); })
+    return sensor.of(z);
+  else
+    return (sensor);
+}
+template <class L>
+using ModelOf = std::remove_cvref_t<decltype(model_of(std::declval<const L&>(),
+                                                      std::declval<const typename L::Measurement&>()))>;
+/// What is held against the prediction.
+template <class L, class Model>
+[[nodiscard]] typename Model::Measurement measured(const Model& model, const typename L::Measurement& z) {
+  if constexpr (std::same_as<Model, L>)
+    return z;
+  else
+    return model.measured();
+}
+
+template <class L>
+concept SensorOfPoseAndPart =
+    ConditionalMeasurement<L> && requires(const L& l, const typename L::State& x, const typename L::Part& m) {
+      { l.state_jacobian(x, m) } -> detail::JacobianLike<typename L::Measurement, typename L::State>;
+    };
+
+}  // namespace detail
+
 /// A sensor of landmarks: one sighting determines where its landmark is, given the pose.
 template <class L>
 concept LandmarkSensor =
-    ConditionalMeasurement<L> && requires(const L& l, const typename L::State& x, const typename L::Part& m,
-                                          const typename L::Measurement& z) {
-      { l.state_jacobian(x, m) } -> detail::JacobianLike<typename L::Measurement, typename L::State>;
+    std::copyable<typename L::Measurement> && detail::SensorOfPoseAndPart<detail::ModelOf<L>> &&
+    std::same_as<typename detail::ModelOf<L>::State, typename L::State> &&
+    std::same_as<typename detail::ModelOf<L>::Part, typename L::Part> &&
+    requires(const L& l, const typename L::State& x, const typename L::Measurement& z) {
       { l.initialise(x, z) } -> StateOf<typename L::Part>;
     };
 
 /// What was seen, and of which landmark where the sensor knows (a bar code): any small number.
-template <Manifold Z>
+template <std::copyable Z>
 struct LandmarkSighting {
   Z z;
   std::optional<std::uint32_t> identity{};
@@ -124,7 +169,7 @@ namespace detail {
 
 /// The sensor as an ordinary one of the pose, over a landmark that is as uncertain as believed:
 /// noise H_m S H_m^T + R.
-template <LandmarkSensor L>
+template <SensorOfPoseAndPart L>
 struct SensorOfPose {
   using State = typename L::State;
   using Measurement = typename L::Measurement;
@@ -163,8 +208,9 @@ struct LandmarkPlaces<0> {};
 
 /// The landmarks of one particle: ConditionalMap and ChoosingMap. Given which landmark a sighting is of, and
 /// the pose, a landmark is updated by the extended Kalman filter. Landmarks of types other than vectors of up
-/// to three numbers have no index: candidates are then all of them.
-template <LandmarkSensor L>
+/// to three numbers have no index: candidates are then all of them that the sensor does not rule out. `F` is
+/// the filter of a landmark: Extended, Unscented, or another that updates a Gaussian.
+template <LandmarkSensor L, class F = Extended>
 class LandmarkMap {
 public:
   using Sensor = L;
@@ -237,6 +283,9 @@ public:
   }
 
 private:
+  using Model = detail::ModelOf<L>;  // of one sighting
+  using Report = typename Model::Measurement;
+
   struct Common {
     L sensor;
     LandmarkOptions options;
@@ -262,12 +311,18 @@ private:
     return options;
   }
   static double squared_gate(double share) {
-    return share < 1 ? chi_square_quantile(share, dof<Measurement>) : std::numeric_limits<double>::infinity();
+    return share < 1 ? chi_square_quantile(share, dof<Report>) : std::numeric_limits<double>::infinity();
   }
   static Gaussian<Pose> known(const Pose& x) { return {x, CovarianceOf<Pose>::Zero(dof_of(x), dof_of(x))}; }
 
   [[nodiscard]] Candidates candidates_of(const Gaussian<Pose>& x, const Observation& z) const;
   void check(const Observation& z) const;
+  [[nodiscard]] bool begins(const Measurement& z) const {
+    if constexpr (requires(const L& l) { l.determines(z); })
+      return common_->sensor.determines(z);
+    else
+      return true;
+  }
   [[nodiscard]] std::optional<Candidate> candidate(const Gaussian<Pose>& x, const Measurement& z,
                                                    std::uint32_t number, double gate) const;
   template <class Visit>
@@ -305,11 +360,11 @@ struct FromLandmarks {
   int iterations = 1;  ///< of each sighting's update: more where the sensor bends over the pose's spread
 
   /// Throws Error where the motion's covariance is singular: then use FromMotion, or say how the wheels slip.
-  template <LandmarkSensor L>
-  [[nodiscard]] ProposedOf<LandmarkMap<L>> operator()(const LandmarkMap<L>& map,
-                                                      const Gaussian<typename L::State>& motion,
-                                                      const typename LandmarkMap<L>::Observation& z,
-                                                      Random& random) const {
+  template <LandmarkSensor L, class F>
+  [[nodiscard]] ProposedOf<LandmarkMap<L, F>> operator()(const LandmarkMap<L, F>& map,
+                                                         const Gaussian<typename L::State>& motion,
+                                                         const typename LandmarkMap<L, F>::Observation& z,
+                                                         Random& random) const {
     const double log_volume = Cholesky<dof<typename L::State>>(motion.covariance).log_determinant();
     if (!std::isfinite(log_volume))
       raise(
@@ -333,9 +388,10 @@ struct FromLandmarks {
 
 private:
   /// Returns the sum of the innovations' log densities.
-  template <LandmarkSensor L>
-  double take_in(Gaussian<typename L::State>& q, const LandmarkMap<L>& map,
-                 const typename LandmarkMap<L>::Observation& z, const Association& n) const {
+  template <LandmarkSensor L, class F>
+  double take_in(Gaussian<typename L::State>& q, const LandmarkMap<L, F>& map,
+                 const typename LandmarkMap<L, F>::Observation& z, const Association& n) const {
+    using Model = detail::ModelOf<L>;
     struct Known {
       std::size_t sighting;
       double log_volume;
@@ -348,8 +404,10 @@ private:
         log_evidence += map.log_density_of(n[k]);
         continue;
       }
-      const detail::SensorOfPose<L> sensor{map.sensor(), landmark->belief};
-      known.push_back({k, Cholesky<dof<typename L::Measurement>>(sensor.noise(q.mean)).log_determinant()});
+      const auto& model = detail::model_of(map.sensor(), z[k].z);
+      const detail::SensorOfPose<Model> sensor{model, landmark->belief};
+      known.push_back(
+          {k, Cholesky<dof<typename Model::Measurement>>(sensor.noise(q.mean)).log_determinant()});
     }
     std::sort(known.begin(), known.end(), [](const Known& a, const Known& b) {
       return a.log_volume < b.log_volume || (a.log_volume == b.log_volume && a.sighting < b.sighting);
@@ -357,17 +415,19 @@ private:
     const Extended filter{.iterations = iterations};
     for (const Known& each : known) {
       const auto& landmark = map.find(n[each.sighting])->belief;
-      const auto in = filter.update(q, detail::SensorOfPose<L>{map.sensor(), landmark}, z[each.sighting].z);
+      const auto& model = detail::model_of(map.sensor(), z[each.sighting].z);
+      const auto in = filter.update(q, detail::SensorOfPose<Model>{model, landmark},
+                                    detail::measured<L>(model, z[each.sighting].z));
       if (in.accepted()) log_evidence += in.log_likelihood();
     }
     return log_evidence;
   }
 };
 
-template <LandmarkSensor L>
-void LandmarkMap<L>::check(const Observation& z) const {
+template <LandmarkSensor L, class F>
+void LandmarkMap<L, F>::check(const Observation& z) const {
   for (std::size_t k = 0; k < z.size(); ++k) {
-    if (!detail::finite_state(z[k].z))
+    if (!detail::finite_state(detail::measured<L>(detail::model_of(common_->sensor, z[k].z), z[k].z)))
       raise("LandmarkMap: expected sightings of finite numbers, found another: " + std::to_string(k));
     if (z[k].identity && *z[k].identity >= most_identity)
       raise("LandmarkMap: expected identities below " + std::to_string(most_identity) + ", found " +
@@ -376,24 +436,27 @@ void LandmarkMap<L>::check(const Observation& z) const {
 }
 
 /// The sighting as one of this landmark; nothing where it lies outside the gate.
-template <LandmarkSensor L>
-auto LandmarkMap<L>::candidate(const Gaussian<Pose>& x, const Measurement& z, std::uint32_t number,
-                               double gate) const -> std::optional<Candidate> {
-  const detail::SensorOfPose<L> sensor{common_->sensor, find(number)->belief};
+template <LandmarkSensor L, class F>
+auto LandmarkMap<L, F>::candidate(const Gaussian<Pose>& x, const Measurement& z, std::uint32_t number,
+                                  double gate) const -> std::optional<Candidate> {
+  const Gaussian<Landmark>& belief = find(number)->belief;
+  if constexpr (requires(const L& l) { l.may_be(x.mean, z, belief.mean); })
+    if (!common_->sensor.may_be(x.mean, z, belief.mean)) return std::nullopt;
+  const auto& model = detail::model_of(common_->sensor, z);
+  const detail::SensorOfPose<Model> sensor{model, belief};
   const auto h = detail::dense_of(sensor.jacobian(x.mean));
-  Innovation<dof<Measurement>, ScalarOf<Measurement>> in;
-  in.residual = local(Measurement(sensor.predict(x.mean)), z);
-  in.covariance =
-      symmetrised(CovarianceOf<Measurement>(h * x.covariance * h.transpose() + sensor.noise(x.mean)));
-  const Cholesky<dof<Measurement>> root(in.covariance);
+  Innovation<dof<Report>, ScalarOf<Report>> in;
+  in.residual = local(Report(sensor.predict(x.mean)), detail::measured<L>(model, z));
+  in.covariance = symmetrised(CovarianceOf<Report>(h * x.covariance * h.transpose() + sensor.noise(x.mean)));
+  const Cholesky<dof<Report>> root(in.covariance);
   if (!root.good()) return std::nullopt;
   in.nis = root.whiten(in.residual).squaredNorm();
   if (!(in.nis <= gate)) return std::nullopt;
   return Candidate{number, in.log_likelihood()};
 }
 
-template <LandmarkSensor L>
-auto LandmarkMap<L>::candidates_of(const Gaussian<Pose>& x, const Observation& z) const -> Candidates {
+template <LandmarkSensor L, class F>
+auto LandmarkMap<L, F>::candidates_of(const Gaussian<Pose>& x, const Observation& z) const -> Candidates {
   check(z);
   Candidates all(z.size());
   for (std::size_t k = 0; k < z.size(); ++k) {
@@ -408,7 +471,8 @@ auto LandmarkMap<L>::candidates_of(const Gaussian<Pose>& x, const Observation& z
       add(*z[k].identity);
     else if (!of.is_named)
       for_each_near(x, z[k].z, add);
-    const bool is_new = !is_of_the_map && (of.is_named || options().new_density >= options().clutter_density);
+    const bool is_new = !is_of_the_map && begins(z[k].z) &&
+                        (of.is_named || options().new_density >= options().clutter_density);
     of.otherwise.landmark = is_new ? new_landmark : no_landmark;
     of.otherwise.log_density = log_density_of(of.otherwise.landmark);
     // Candidates come in the order of the index, which depends on its history.
@@ -420,18 +484,19 @@ auto LandmarkMap<L>::candidates_of(const Gaussian<Pose>& x, const Observation& z
 
 /// Landmarks that a sighting from here may be of. Of a landmark inside the gate each number of its place
 /// differs from the sighting's by no more than the gate's root times the sum of both standard deviations.
-template <LandmarkSensor L>
+template <LandmarkSensor L, class F>
 template <class Visit>
-void LandmarkMap<L>::for_each_near(const Gaussian<Pose>& x, const Measurement& z, Visit&& visit) const {
+void LandmarkMap<L, F>::for_each_near(const Gaussian<Pose>& x, const Measurement& z, Visit&& visit) const {
   if constexpr (!is_placed) {
     for_each([&](std::uint32_t number, const auto&) { visit(number); });
   } else {
     const Landmark place = common_->sensor.initialise(x.mean, z);
-    const auto h_m = detail::dense_of(common_->sensor.part_jacobian(x.mean, place));
-    const auto h_x = detail::dense_of(common_->sensor.state_jacobian(x.mean, place));
-    const CovarianceOf<Measurement> r =
-        h_x * x.covariance * h_x.transpose() + detail::dense_of(common_->sensor.noise(x.mean, place));
-    const Cholesky<dof<Measurement>> root(symmetrised(r));
+    const auto& model = detail::model_of(common_->sensor, z);
+    const auto h_m = detail::dense_of(model.part_jacobian(x.mean, place));
+    const auto h_x = detail::dense_of(model.state_jacobian(x.mean, place));
+    const CovarianceOf<Report> r =
+        h_x * x.covariance * h_x.transpose() + detail::dense_of(model.noise(x.mean, place));
+    const Cholesky<dof<Report>> root(symmetrised(r));
     if (!root.good() || !all_finite(place)) return;
     const auto white = root.whiten(h_m);
     const Cholesky<places> information(symmetrised(CovarianceOf<Landmark>(white.transpose() * white)));
@@ -448,8 +513,8 @@ void LandmarkMap<L>::for_each_near(const Gaussian<Pose>& x, const Measurement& z
   }
 }
 
-template <LandmarkSensor L>
-Chosen<Association> LandmarkMap<L>::likeliest(const Candidates& candidates) const {
+template <LandmarkSensor L, class F>
+Chosen<Association> LandmarkMap<L, F>::likeliest(const Candidates& candidates) const {
   std::vector<std::uint32_t> columns;
   for (const Alternatives& of : candidates)
     for (const Candidate& c : of.known) columns.push_back(c.landmark);
@@ -477,8 +542,8 @@ Chosen<Association> LandmarkMap<L>::likeliest(const Candidates& candidates) cons
   return result;
 }
 
-template <LandmarkSensor L>
-Chosen<Association> LandmarkMap<L>::drawn(const Candidates& candidates, Random& random) {
+template <LandmarkSensor L, class F>
+Chosen<Association> LandmarkMap<L, F>::drawn(const Candidates& candidates, Random& random) {
   Chosen<Association> result;
   const auto taken = [&](std::uint32_t landmark) {
     return std::find(result.choice.begin(), result.choice.end(), landmark) != result.choice.end();
@@ -502,15 +567,15 @@ Chosen<Association> LandmarkMap<L>::drawn(const Candidates& candidates, Random& 
   return result;
 }
 
-template <LandmarkSensor L>
-Chosen<Association> LandmarkMap<L>::associate(const Gaussian<Pose>& x, const Observation& z,
-                                              Random& random) const {
+template <LandmarkSensor L, class F>
+Chosen<Association> LandmarkMap<L, F>::associate(const Gaussian<Pose>& x, const Observation& z,
+                                                 Random& random) const {
   const Candidates candidates = candidates_of(x, z);
   return options().pick == Pick::drawn ? drawn(candidates, random) : likeliest(candidates);
 }
 
-template <LandmarkSensor L>
-double LandmarkMap<L>::log_likelihood(const Pose& x, const Observation& z, const Choice& n) const {
+template <LandmarkSensor L, class F>
+double LandmarkMap<L, F>::log_likelihood(const Pose& x, const Observation& z, const Choice& n) const {
   CAIRN_EXPECTS(n.size() == z.size(), "log_likelihood needs one landmark for each sighting");
   double sum = 0;
   for (std::size_t k = 0; k < z.size(); ++k) {
@@ -519,15 +584,16 @@ double LandmarkMap<L>::log_likelihood(const Pose& x, const Observation& z, const
       sum += log_density_of(n[k]);
       continue;
     }
-    const detail::SensorOfPose<L> sensor{common_->sensor, landmark->belief};
-    const Gaussian<Measurement> expected{Measurement(sensor.predict(x)), sensor.noise(x)};
-    sum += log_density(expected, z[k].z);
+    const auto& model = detail::model_of(common_->sensor, z[k].z);
+    const detail::SensorOfPose<Model> sensor{model, landmark->belief};
+    const Gaussian<Report> expected{Report(sensor.predict(x)), sensor.noise(x)};
+    sum += log_density(expected, detail::measured<L>(model, z[k].z));
   }
   return sum;
 }
 
-template <LandmarkSensor L>
-void LandmarkMap<L>::insert(const Pose& x, const Observation& z, const Choice& n) {
+template <LandmarkSensor L, class F>
+void LandmarkMap<L, F>::insert(const Pose& x, const Observation& z, const Choice& n) {
   CAIRN_EXPECTS(n.size() == z.size(), "insert needs one landmark for each sighting");
   bool unnamed = false;
   for (std::size_t k = 0; k < z.size(); ++k) {
@@ -540,11 +606,15 @@ void LandmarkMap<L>::insert(const Pose& x, const Observation& z, const Choice& n
   if (unnamed) miss(x, n);
 }
 
-template <LandmarkSensor L>
-void LandmarkMap<L>::update(const Pose& x, const Measurement& z, std::uint32_t number) {
+template <LandmarkSensor L, class F>
+void LandmarkMap<L, F>::update(const Pose& x, const Measurement& z, std::uint32_t number) {
   MappedLandmark<Landmark>& landmark = landmarks_.write(number);
-  const auto in = Extended{}.update(landmark.belief, detail::HeldSensor<L>{common_->sensor, x}, z);
+  const auto& model = detail::model_of(common_->sensor, z);
+  const auto in =
+      F{}.update(landmark.belief, detail::HeldSensor<Model>{model, x}, detail::measured<L>(model, z));
   if (!in.accepted()) return;
+  if constexpr (requires(const L& l) { l.note(landmark.belief.mean, x, z); })
+    common_->sensor.note(landmark.belief.mean, x, z);
   ++landmark.sightings;
   landmark.log_odds =
       std::min(landmark.log_odds + gained_odds(x, landmark.belief.mean), options().most_log_odds);
@@ -553,13 +623,14 @@ void LandmarkMap<L>::update(const Pose& x, const Measurement& z, std::uint32_t n
 
 /// The landmark that this sighting alone says: covariance (H_m^T R^-1 H_m)^-1. Nothing where it does not
 /// determine one.
-template <LandmarkSensor L>
-std::optional<Gaussian<typename LandmarkMap<L>::Landmark>> LandmarkMap<L>::seen_first(
+template <LandmarkSensor L, class F>
+std::optional<Gaussian<typename LandmarkMap<L, F>::Landmark>> LandmarkMap<L, F>::seen_first(
     const Pose& x, const Measurement& z) const {
   Gaussian<Landmark> landmark{common_->sensor.initialise(x, z), {}};
-  const auto h = detail::dense_of(common_->sensor.part_jacobian(x, landmark.mean));
-  const CovarianceOf<Measurement> r = detail::dense_of(common_->sensor.noise(x, landmark.mean));
-  const Cholesky<dof<Measurement>> root(r);
+  const auto& model = detail::model_of(common_->sensor, z);
+  const auto h = detail::dense_of(model.part_jacobian(x, landmark.mean));
+  const CovarianceOf<Report> r = detail::dense_of(model.noise(x, landmark.mean));
+  const Cholesky<dof<Report>> root(r);
   if (!root.good() || !all_finite(h) || !detail::finite_state(landmark.mean)) return std::nullopt;
   const auto white = root.whiten(h);
   const Cholesky<dof<Landmark>> information(symmetrised(CovarianceOf<Landmark>(white.transpose() * white)));
@@ -568,8 +639,8 @@ std::optional<Gaussian<typename LandmarkMap<L>::Landmark>> LandmarkMap<L>::seen_
   return landmark;
 }
 
-template <LandmarkSensor L>
-void LandmarkMap<L>::add(const Pose& x, const Sighting& sighting) {
+template <LandmarkSensor L, class F>
+void LandmarkMap<L, F>::add(const Pose& x, const Sighting& sighting) {
   const auto landmark = seen_first(x, sighting.z);
   if (!landmark) return;
   const auto number = sighting.identity.value_or(static_cast<std::uint32_t>(landmarks_.size()));
@@ -579,15 +650,15 @@ void LandmarkMap<L>::add(const Pose& x, const Sighting& sighting) {
   file(number, true);
 }
 
-template <LandmarkSensor L>
-void LandmarkMap<L>::remove(std::uint32_t number) {
+template <LandmarkSensor L, class F>
+void LandmarkMap<L, F>::remove(std::uint32_t number) {
   if constexpr (is_placed) places_.tree.erase(places_.filed[number], number);
   landmarks_.write(number).sightings = 0;
   --size_;
 }
 
-template <LandmarkSensor L>
-void LandmarkMap<L>::file(std::uint32_t number, bool is_new) {
+template <LandmarkSensor L, class F>
+void LandmarkMap<L, F>::file(std::uint32_t number, bool is_new) {
   if constexpr (is_placed) {
     const Gaussian<Landmark>& belief = find(number)->belief;
     typename SharedKdTree<places>::Point at;
@@ -606,8 +677,8 @@ void LandmarkMap<L>::file(std::uint32_t number, bool is_new) {
 }
 
 /// What a sighting adds to the log odds: how much more likely it is of a landmark than of none.
-template <LandmarkSensor L>
-double LandmarkMap<L>::gained_odds(const Pose& x, const Landmark& m) const {
+template <LandmarkSensor L, class F>
+double LandmarkMap<L, F>::gained_odds(const Pose& x, const Landmark& m) const {
   double detected = 0;
   if constexpr (requires(const L& l) { l.detection_probability(x, m); })
     detected = common_->sensor.detection_probability(x, m);
@@ -615,8 +686,8 @@ double LandmarkMap<L>::gained_odds(const Pose& x, const Landmark& m) const {
 }
 
 /// Whatever was surely in view and not seen is less likely to be there.
-template <LandmarkSensor L>
-void LandmarkMap<L>::miss(const Pose& x, const Choice& seen) {
+template <LandmarkSensor L, class F>
+void LandmarkMap<L, F>::miss(const Pose& x, const Choice& seen) {
   if constexpr (requires(const L& l, const Landmark& m) { l.detection_probability(x, m); }) {
     for (const std::uint32_t number : in_view(x)) {
       if (std::find(seen.begin(), seen.end(), number) != seen.end()) continue;
@@ -633,8 +704,8 @@ void LandmarkMap<L>::miss(const Pose& x, const Choice& seen) {
   }
 }
 
-template <LandmarkSensor L>
-std::vector<std::uint32_t> LandmarkMap<L>::in_view(const Pose& x) const {
+template <LandmarkSensor L, class F>
+std::vector<std::uint32_t> LandmarkMap<L, F>::in_view(const Pose& x) const {
   std::vector<std::uint32_t> numbers;
   if constexpr (is_placed && requires(const L& l) {
                   l.reach();
@@ -656,8 +727,8 @@ std::vector<std::uint32_t> LandmarkMap<L>::in_view(const Pose& x) const {
 
 /// The least probability of detection over the mean and the ends of a standard deviation along each axis: at
 /// the rim of the field of view nothing is certain.
-template <LandmarkSensor L>
-double LandmarkMap<L>::certain_detection(const Pose& x, const Gaussian<Landmark>& landmark) const {
+template <LandmarkSensor L, class F>
+double LandmarkMap<L, F>::certain_detection(const Pose& x, const Gaussian<Landmark>& landmark) const {
   double least = common_->sensor.detection_probability(x, landmark.mean);
   for (int a = 0; a < dof<Landmark>; ++a)
     for (const double sign : {-1.0, 1.0}) {
