@@ -39,6 +39,7 @@
 #include <cairn/filter/batch.hpp>
 #include <cairn/filter/conditional.hpp>
 #include <cairn/filter/constraint.hpp>
+#include <cairn/filter/diagnosis.hpp>
 #include <cairn/filter/differentiate.hpp>
 #include <cairn/filter/ensemble.hpp>
 #include <cairn/filter/extended.hpp>

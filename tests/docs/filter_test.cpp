@@ -11,6 +11,7 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/statistics.hpp>
+#include <cairn/filter/diagnosis.hpp>
 #include <cairn/filter/differentiate.hpp>
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/filter.hpp>
@@ -133,6 +134,15 @@ TEST_CASE("docs: the example of vectorised.hpp predicts") {
   CHECK(status == cairn::Status::accepted);
   CHECK(belief.mean[0] == doctest::Approx(3.5));
   CHECK(belief.covariance(0, 0) == doctest::Approx(2.0));
+}
+
+TEST_CASE("docs: the first example of diagnosis.hpp says nothing of a measurement that is taken") {
+  const cairn::Kalman filter;
+  const cairn::PositionSensor<2, 4> gps;
+  const cairn::Vector<2> z(3.0, 4.0);
+  cairn::Gaussian<cairn::Vector<4>> belief{cairn::Vector<4>::Zero(), cairn::Matrix<4>::Identity()};
+#include "snippets/filter/diagnosis_1.inc"
+  CHECK(innovation.accepted());
 }
 
 TEST_CASE("docs: the first example of differentiate.hpp differentiates") {

@@ -280,6 +280,9 @@ void check_refusals(const I& index, Points queries) {
   CHECK_THROWS_AS(static_cast<void>(index.nearest(queries[4])), cairn::Error);
   CHECK_THROWS_AS(static_cast<void>(index.nearest(short_query, 2)), cairn::Error);
   CHECK_THROWS_AS(static_cast<void>(index.within(queries[4], 1)), cairn::Error);
+  CHECK_THROWS_AS(static_cast<void>(index.within(queries[0], std::numeric_limits<float>::quiet_NaN())),
+                  cairn::Error);
+  CHECK_THROWS_AS(static_cast<void>(index.within(queries[0], -1)), cairn::Error);
   CHECK_THROWS_AS(index.search(short_query, seen, {.budget = {.leaves = 1}}, scratch), cairn::Error);
   std::vector<Seen> collectors(queries.size());
   std::string message;

@@ -20,6 +20,7 @@
 #include <limits>
 
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/detail/agreement.hpp>
 #include <cairn/filter/detail/covariance.hpp>
 #include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/gaussian.hpp>

@@ -25,8 +25,10 @@
 
 #include <concepts>
 #include <limits>
+#include <type_traits>
 
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/detail/agreement.hpp>
 #include <cairn/filter/detail/explain_sizes.hpp>
 #include <cairn/filter/matrix_of.hpp>
 #include <cairn/filter/model.hpp>
@@ -57,9 +59,50 @@ struct Numeric : Model {
   }
 };
 
+namespace detail {
+
+/// X with dual numbers.
+template <class X>
+using Dualled = typename Recast<X, Dual<ScalarOf<X>, dof<X>>>::type;
+
+/// Whether what a function gave for duals has duals. (A State of doubles may convert from duals by the looks
+/// of it, so that a function that takes it can be called, too.)
+template <class A, class X>
+consteval bool has_duals() {
+  using D = Dual<ScalarOf<X>, dof<X>>;
+  if constexpr (requires { typename ShapeOf<std::remove_cvref_t<A>>::Scalar; })
+    return std::same_as<typename ShapeOf<std::remove_cvref_t<A>>::Scalar, D>;
+  else
+    return std::same_as<ScalarOf<std::remove_cvref_t<A>>, D>;
+}
+
+/// Whether propagate or predict, where there is one for the number itself, takes duals too.
+template <class Model>
+inline constexpr bool takes_duals = [] {
+  using X = typename Model::State;
+  if constexpr (dof<X> == dynamic) {
+    return true;  // is refused by automatic_jacobian
+  } else if constexpr (ProcessModel<Model>) {
+    return requires(const Model& model, const Dualled<X>& x, const typename Model::Control& u) {
+      requires has_duals<decltype(model.propagate(x, u, 0.0)), X>();
+    };
+  } else if constexpr (MeasurementModel<Model>) {
+    return requires(const Model& model, const Dualled<X>& x) {
+      requires has_duals<decltype(model.predict(x)), X>();
+    };
+  } else {
+    return true;  // nothing that could be differentiated: the filter says what is missing
+  }
+}();
+
+}  // namespace detail
+
 /// The model with Jacobians by dual numbers.
 template <class Model>
 struct Automatic : Model {
+  static_assert(detail::takes_duals<Model>,
+                "cairn: automatic() sends dual numbers through propagate() or predict(), which has to be a "
+                "template over the number for that; numeric() takes the model as it is");
   using State = typename Model::State;
 
   template <class Control>

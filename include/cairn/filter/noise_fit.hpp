@@ -18,6 +18,7 @@
 #include <vector>
 
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/detail/agreement.hpp>
 #include <cairn/filter/detail/covariance.hpp>
 #include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/detail/products.hpp>

@@ -24,6 +24,7 @@
 
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/random.hpp>
+#include <cairn/filter/detail/agreement.hpp>
 #include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/gaussian.hpp>

@@ -19,6 +19,7 @@
 #include <optional>
 
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/detail/agreement.hpp>
 #include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/detail/products.hpp>
 #include <cairn/filter/detail/update.hpp>

@@ -29,6 +29,7 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/filter/detail/agreement.hpp>
 #include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/filter.hpp>
 #include <cairn/filter/gaussian.hpp>

@@ -37,7 +37,8 @@ public:
   BruteForce() = default;
 
   /// Throws Error, naming the point, for a coordinate that is not finite or cannot be kept.
-  template <PointSet Points>
+  template <class Points>
+    requires(PointSet<Points> || detail::explain_points<Points>)
   explicit BruteForce(const Points& points, M metric = {})
       : metric_(std::move(metric)),
         dim_(detail::dimension_of<Dim>(points)),
@@ -71,10 +72,9 @@ public:
     return detail::nearest_into(found, metric_, [&](auto& collector) { search(query, collector); });
   }
 
-  /// All points at most `radius` away, nearest first. radius >= 0.
+  /// All points at most `radius` away, nearest first. Throws Error where that is negative or NaN.
   template <Point Query>
   [[nodiscard]] std::vector<Hit> within(const Query& query, Real radius) const {
-    CAIRN_EXPECTS(radius >= 0, "BruteForce::within: a radius is not negative");
     return detail::all_within(radius, metric_, [&](auto& collector) { search(query, collector); });
   }
 

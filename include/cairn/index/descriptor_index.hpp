@@ -163,10 +163,9 @@ public:
   std::size_t nearest(const Query& query, std::span<Hit> found) const {
     return detail::nearest_into(found, L2{}, [&](auto& collector) { search(query, collector); });
   }
-  /// All points at most `radius` away, nearest first. radius >= 0.
+  /// All points at most `radius` away, nearest first. Throws Error where that is negative or NaN.
   template <Point Query>
   [[nodiscard]] std::vector<Hit> within(const Query& query, float radius) const {
-    CAIRN_EXPECTS(radius >= 0, "DescriptorIndex::within: a radius is not negative");
     return detail::all_within(radius, L2{}, [&](auto& collector) { search(query, collector); });
   }
 

@@ -65,7 +65,8 @@ public:
   KdForest() = default;
 
   /// Throws Error for points that are not finite or of different dimensions.
-  template <PointSet Points>
+  template <class Points>
+    requires(PointSet<Points> || detail::explain_points<Points>)
   explicit KdForest(const Points& points, const KdForestOptions& options = {}) {
     CAIRN_EXPECTS(options.trees >= 1, "KdForest: there must be a tree");
     if (points.size() == 0) return;
@@ -119,10 +120,9 @@ public:
   std::size_t nearest(const Query& query, std::span<Hit> found) const {
     return detail::nearest_into(found, L2{}, [&](auto& collector) { search(query, collector); });
   }
-  /// All points at most `radius` away, nearest first. radius >= 0.
+  /// All points at most `radius` away, nearest first. Throws Error where that is negative or NaN.
   template <Point Query>
   [[nodiscard]] std::vector<Hit> within(const Query& query, float radius) const {
-    CAIRN_EXPECTS(radius >= 0, "KdForest::within: a radius is not negative");
     return detail::all_within(radius, L2{}, [&](auto& collector) { search(query, collector); });
   }
 

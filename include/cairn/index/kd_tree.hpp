@@ -73,7 +73,8 @@ public:
   /// Builds from a set of points, ids 0 ... n - 1. Throws Error, naming the point, for a coordinate that is
   /// not finite (or so large that squares overflow; or, for whole Scalars, none of theirs) and for points of
   /// different dimensions. O(n log n).
-  template <PointSet Points>
+  template <class Points>
+    requires(PointSet<Points> || detail::explain_points<Points>)
   explicit KdTree(const Points& points, M metric = {}, BuildOptions options = {})
       : KdTree(detail::copy_points<Scalar>(points, detail::dimension_of<Dim>(points), "KdTree: point"), {},
                detail::dimension_of<Dim>(points), std::move(metric), options.threads) {}
@@ -140,10 +141,9 @@ public:
     return detail::nearest_into(found, metric_, [&](auto& collector) { search(query, collector); });
   }
 
-  /// All points at most `radius` away, nearest first. radius >= 0.
+  /// All points at most `radius` away, nearest first. Throws Error where that is negative or NaN.
   template <Point Query>
   [[nodiscard]] std::vector<Hit> within(const Query& query, Real radius) const {
-    CAIRN_EXPECTS(radius >= 0, "KdTree::within: a radius is not negative");
     return detail::all_within(radius, metric_, [&](auto& collector) { search(query, collector); });
   }
 
@@ -273,8 +273,9 @@ inline constexpr bool is_kd_tree<KdTree<Scalar, Dim, M>> = true;
 }  // namespace detail
 
 /// Without arguments in <> a tree keeps coordinates as the points have them: doubles stay doubles.
-template <PointSet Points, class M = L2>
-  requires(!std::convertible_to<M, std::span<const PointId>>)
+template <class Points, class M = L2>
+  requires((PointSet<Points> || detail::explain_points<Points>) &&
+           !std::convertible_to<M, std::span<const PointId>>)
 KdTree(const Points&, M = {}, BuildOptions = {}) -> KdTree<detail::CoordinateOf<Points>, dynamic_dim, M>;
 template <PointSet Points, class M = L2>
 KdTree(const Points&, std::span<const PointId>, M = {}, BuildOptions = {})

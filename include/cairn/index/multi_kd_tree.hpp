@@ -106,7 +106,8 @@ public:
 
   /// Adds points under new consecutive ids, the first of which it returns: one more than any id so far.
   /// Throws as KdTree does, leaving the index as it was.
-  template <PointSet Points>
+  template <class Points>
+    requires(PointSet<Points> || detail::explain_points<Points>)
   PointId insert(const Points& points) {
     const auto count = static_cast<std::size_t>(points.size());
     if (count > no_point - state_.size())
@@ -188,10 +189,9 @@ public:
     return detail::nearest_into(found, metric_, [&](auto& collector) { search(query, collector); });
   }
 
-  /// All points at most `radius` away, nearest first. radius >= 0.
+  /// All points at most `radius` away, nearest first. Throws Error where that is negative or NaN.
   template <Point Query>
   [[nodiscard]] std::vector<Hit> within(const Query& query, Real radius) const {
-    CAIRN_EXPECTS(radius >= 0, "MultiKdTree::within: a radius is not negative");
     return detail::all_within(radius, metric_, [&](auto& collector) { search(query, collector); });
   }
 

@@ -47,7 +47,8 @@ public:
   PackedPoints() = default;
 
   /// Copies the points, ids 0 ... n - 1. Throws Error, naming the point, for a coordinate that is not finite.
-  template <PointSet Points>
+  template <class Points>
+    requires(PointSet<Points> || detail::explain_points<Points>)
   explicit PackedPoints(const Points& points)
       : dim_(detail::dimension_of<dynamic_dim>(points)), count_(static_cast<std::size_t>(points.size())) {
     const auto rows = detail::copy_points<float>(points, dim_, "PackedPoints: point");

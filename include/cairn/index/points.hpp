@@ -50,6 +50,27 @@ concept PointSet = requires(const S& set, std::size_t i) {
 
 namespace detail {
 
+/// Ends in the sentence, which names the type of the points.
+template <class P>
+struct PointHasBrackets {
+  static_assert(
+      Point<P>,
+      "cairn: a point needs [axis] that gives a number; cairn::Through sees a set of points without "
+      "it: Through(points, 3, [](const P& p, std::size_t axis) { return axis == 0 ? p.x : ...; })");
+};
+
+/// False; or, of a container of what is no point, the sentence. Stands where a set is asked for:
+/// `PointSet<S> || detail::explain_points<S>`.
+template <class S>
+inline constexpr bool explain_points = [] {
+  if constexpr (requires(const S& set, std::size_t i) {
+                  { set.size() } -> std::convertible_to<std::size_t>;
+                  set[i];
+                })
+    static_cast<void>(sizeof(PointHasBrackets<std::remove_cvref_t<decltype(std::declval<const S&>()[0])>>));
+  return false;
+}();
+
 /// A matrix in memory: an Eigen matrix, map, block or transpose, or whatever else has these members.
 template <class Matrix>
 concept MatrixInMemory = requires(const Matrix& matrix) {

@@ -2,12 +2,15 @@
 // SPDX-License-Identifier: MIT
 //
 /// @file
-/// What the compiler says about a model whose matrices have a wrong size or number type.
+/// What the compiler says about a model whose matrices have a wrong size or number type, whose functions are
+/// not const, or which is no model for the filter that it is given to.
 ///
 /// A filter takes F where `LinearProcess<F> || detail::explain_sizes<F>`: the concept is the condition; only
 /// where it is false is the model looked through here, and a matrix that cannot fit ends in a sentence with
 /// the sizes Expected<rows, columns, number> and Found<...> (-1 for one known at run time) instead of a list
-/// of failed overloads. Everything else that a model may lack is left to what the compiler says of concepts.
+/// of failed overloads; so does a function that is not const. explain_linear and explain_jacobian stand
+/// behind it where a filter asks for more. Everything else that a model may lack is left to what the compiler
+/// says of concepts. The sentences themselves: agreement.hpp.
 #pragma once
 
 #include <concepts>
@@ -15,123 +18,34 @@
 #include <utility>
 
 #include <cairn/core/linalg.hpp>
+#include <cairn/filter/detail/agreement.hpp>
 #include <cairn/filter/matrix_of.hpp>
 #include <cairn/manifold/manifold.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
-template <int Rows, int Columns, class Number>
-struct Expected {};
-template <int Rows, int Columns, class Number>
-struct Found {};
-
 template <class A>
 using FoundIn = Found<ShapeOf<std::remove_cvref_t<A>>::rows, ShapeOf<std::remove_cvref_t<A>>::columns,
                       typename ShapeOf<std::remove_cvref_t<A>>::Scalar>;
 
-template <class A, class B>
-inline constexpr bool same_size = false;
-template <int R, int C, class S, int FoundR, int FoundC>
-inline constexpr bool same_size<Expected<R, C, S>, Found<FoundR, FoundC, S>> =
-    may_equal(R, FoundR) && may_equal(C, FoundC);
-/// A row does for a column.
-template <class A, class B>
-inline constexpr bool same_vector = same_size<A, B>;
-template <int N, class S, int FoundR, int FoundC>
-inline constexpr bool same_vector<Expected<N, 1, S>, Found<FoundR, FoundC, S>> =
-    (may_equal(N, FoundR) && may_equal(1, FoundC)) || (may_equal(1, FoundR) && may_equal(N, FoundC));
-
-// One for each thing a model says, so that the sentence names it. "Expected" and "Found" stand beside it in
-// what the compiler prints.
-template <class Expected, class Found>
-struct NoiseOfProcessHas {
-  static_assert(
-      same_size<Expected, Found>,
-      "cairn: noise(x, u, dt) of a process is the covariance of a step of its State (of its Noise, where it "
-      "has one); Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
+/// Found<...> of what stands for a matrix; of all else, what was expected.
+template <class Size, class A>
+struct FoundOr;
+template <int R, int C, class S, class A>
+struct FoundOr<Expected<R, C, S>, A> {
+  using type = Found<R, C, S>;
 };
-template <class Expected, class Found>
-struct JacobianOfProcessHas {
-  static_assert(same_size<Expected, Found>,
-                "cairn: jacobian(x, u, dt) of a process maps steps of its State to steps of its State; "
-                "Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
-};
-template <class Expected, class Found>
-struct PropagatedStateHas {
-  static_assert(same_vector<Expected, Found>,
-                "cairn: propagate() of a process returns its State; Expected<rows, columns, number type> and "
-                "Found<...> say what it has to be and what it is");
-};
-template <class Expected, class Found>
-struct NoiseOfSensorHas {
-  static_assert(
-      same_size<Expected, Found>,
-      "cairn: noise(x) of a sensor is the covariance of a step of its Measurement (of its Noise, where it "
-      "has one); Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
-};
-template <class Expected, class Found>
-struct JacobianOfSensorHas {
-  static_assert(same_size<Expected, Found>,
-                "cairn: jacobian(x) of a sensor maps steps of its State to steps of its Measurement; "
-                "Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
-};
-template <class Expected, class Found>
-struct PredictedMeasurementHas {
-  static_assert(same_vector<Expected, Found>,
-                "cairn: predict() of a sensor returns its Measurement; Expected<rows, columns, number type> "
-                "and Found<...> say what it has to be and what it is");
-};
-template <class Expected, class Found>
-struct RateHas {
-  static_assert(same_vector<Expected, Found>,
-                "cairn: rate(x, u) of a process in continuous time is a step of its State a second; "
-                "Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
-};
-template <class Expected, class Found>
-struct RateJacobianHas {
-  static_assert(
-      same_size<Expected, Found>,
-      "cairn: rate_jacobian(x, u) of a process in continuous time maps steps of its State to rates; "
-      "Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
-};
-template <class Expected, class Found>
-struct SpectralDensityHas {
-  static_assert(
-      same_size<Expected, Found>,
-      "cairn: spectral_density(x, u) of a process in continuous time is a covariance of steps of its State a "
-      "second; Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
-};
-template <class Expected, class Found>
-struct JacobianByPartHas {
-  static_assert(
-      same_size<Expected, Found>,
-      "cairn: part_jacobian(x, part) of a sensor maps steps of its Part to steps of its Measurement; "
-      "Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
-};
-template <class Expected, class Found>
-struct GivenVectorHas {
-  static_assert(same_vector<Expected, Found>,
-                "cairn: the measurement or control that was given is no Measurement or Control of the model; "
-                "Expected<rows, columns, number type> and Found<...> say what it has to be and what it is");
-};
-template <class OfState, class OfMeasurement>
-struct NumberOfMeasurementIs {
-  static_assert(std::same_as<OfState, OfMeasurement>,
-                "cairn: a Measurement has the number type of the State it is taken of");
-};
-template <class Expected, class Found>
-struct TangentIs {
-  static_assert(
-      std::same_as<Expected, Found>,
-      "cairn: a step of a State is Vector<dof, Scalar>: manifold_traits<State>::Tangent has to be that");
+template <int R, int C, class S, class A>
+  requires requires { typename FoundIn<A>; }
+struct FoundOr<Expected<R, C, S>, A> {
+  using type = FoundIn<A>;
 };
 
-/// Ends in the sentence of `Claim` where what stands for a matrix is not that of Size.
+/// Complete, or the compiler ends in the sentence of Claim where what stands for a matrix is not that of
+/// Size. An alias, for a function would be a further line of gcc's message.
 template <template <class, class> class Claim, class Size, class A>
-consteval void claim() {
-  if constexpr (requires { typename FoundIn<A>; }) static_cast<void>(sizeof(Claim<Size, FoundIn<A>>));
-}
+using Claimed = Claim<Size, typename FoundOr<Size, A>::type>;
 
 template <class X>
 using SquareOf = Expected<dof<X>, dof<X>, ScalarOf<X>>;
@@ -156,30 +70,36 @@ consteval void explain_process() {
   if constexpr (requires(Asked f, const X& x, const U& u, double dt) { f.propagate(x, u, dt); }) {
     using A =
         decltype(std::declval<Asked>().propagate(std::declval<const X&>(), std::declval<const U&>(), 0.0));
-    if constexpr (is_vector<X>) claim<PropagatedStateHas, StepOf<X>, A>();
+    if constexpr (is_vector<X>) static_cast<void>(sizeof(Claimed<PropagatedStateHas, StepOf<X>, A>));
+  } else if constexpr (requires(F& f, const X& x, const U& u, double dt) { f.propagate(x, u, dt); }) {
+    static_cast<void>(sizeof(PropagateIsConst<F>));
   }
   if constexpr (requires(Asked f, const X& x, const U& u, double dt) { f.noise(x, u, dt); }) {
     using A = decltype(std::declval<Asked>().noise(std::declval<const X&>(), std::declval<const U&>(), 0.0));
-    claim<NoiseOfProcessHas, typename NoiseSizeOf<F, X>::type, A>();
+    static_cast<void>(sizeof(Claimed<NoiseOfProcessHas, typename NoiseSizeOf<F, X>::type, A>));
+  } else if constexpr (requires(F& f, const X& x, const U& u, double dt) { f.noise(x, u, dt); }) {
+    static_cast<void>(sizeof(NoiseIsConst<F>));
   }
   if constexpr (requires(Asked f, const X& x, const U& u, double dt) { f.jacobian(x, u, dt); }) {
     using A =
         decltype(std::declval<Asked>().jacobian(std::declval<const X&>(), std::declval<const U&>(), 0.0));
-    claim<JacobianOfProcessHas, SquareOf<X>, A>();
+    static_cast<void>(sizeof(Claimed<JacobianOfProcessHas, SquareOf<X>, A>));
+  } else if constexpr (requires(F& f, const X& x, const U& u, double dt) { f.jacobian(x, u, dt); }) {
+    static_cast<void>(sizeof(JacobianIsConst<F>));
   }
   if constexpr (requires(Asked f, const X& x, const U& u) { f.rate(x, u); }) {
     using A = decltype(std::declval<Asked>().rate(std::declval<const X&>(), std::declval<const U&>()));
-    claim<RateHas, StepOf<X>, A>();
+    static_cast<void>(sizeof(Claimed<RateHas, StepOf<X>, A>));
   }
   if constexpr (requires(Asked f, const X& x, const U& u) { f.rate_jacobian(x, u); }) {
     using A =
         decltype(std::declval<Asked>().rate_jacobian(std::declval<const X&>(), std::declval<const U&>()));
-    claim<RateJacobianHas, SquareOf<X>, A>();
+    static_cast<void>(sizeof(Claimed<RateJacobianHas, SquareOf<X>, A>));
   }
   if constexpr (requires(Asked f, const X& x, const U& u) { f.spectral_density(x, u); }) {
     using A =
         decltype(std::declval<Asked>().spectral_density(std::declval<const X&>(), std::declval<const U&>()));
-    claim<SpectralDensityHas, SquareOf<X>, A>();
+    static_cast<void>(sizeof(Claimed<SpectralDensityHas, SquareOf<X>, A>));
   }
 }
 
@@ -189,15 +109,21 @@ consteval void explain_sensor() {
   using Asked = const H&;
   if constexpr (requires(Asked h, const X& x) { h.predict(x); }) {
     using A = decltype(std::declval<Asked>().predict(std::declval<const X&>()));
-    if constexpr (is_vector<Z>) claim<PredictedMeasurementHas, StepOf<Z>, A>();
+    if constexpr (is_vector<Z>) static_cast<void>(sizeof(Claimed<PredictedMeasurementHas, StepOf<Z>, A>));
+  } else if constexpr (requires(H& h, const X& x) { h.predict(x); }) {
+    static_cast<void>(sizeof(PredictIsConst<H>));
   }
   if constexpr (requires(Asked h, const X& x) { h.noise(x); }) {
     using A = decltype(std::declval<Asked>().noise(std::declval<const X&>()));
-    claim<NoiseOfSensorHas, typename NoiseSizeOf<H, Z>::type, A>();
+    static_cast<void>(sizeof(Claimed<NoiseOfSensorHas, typename NoiseSizeOf<H, Z>::type, A>));
+  } else if constexpr (requires(H& h, const X& x) { h.noise(x); }) {
+    static_cast<void>(sizeof(NoiseIsConst<H>));
   }
   if constexpr (requires(Asked h, const X& x) { h.jacobian(x); }) {
     using A = decltype(std::declval<Asked>().jacobian(std::declval<const X&>()));
-    claim<JacobianOfSensorHas, Expected<dof<Z>, dof<X>, ScalarOf<X>>, A>();
+    static_cast<void>(sizeof(Claimed<JacobianOfSensorHas, Expected<dof<Z>, dof<X>, ScalarOf<X>>, A>));
+  } else if constexpr (requires(H& h, const X& x) { h.jacobian(x); }) {
+    static_cast<void>(sizeof(JacobianIsConst<H>));
   }
 }
 template <class H, Manifold X, Manifold Part, Manifold Z>
@@ -205,12 +131,12 @@ consteval void explain_conditional_sensor() {
   using Asked = const H&;
   if constexpr (requires(Asked h, const X& x, const Part& part) { h.noise(x, part); }) {
     using A = decltype(std::declval<Asked>().noise(std::declval<const X&>(), std::declval<const Part&>()));
-    claim<NoiseOfSensorHas, SquareOf<Z>, A>();
+    static_cast<void>(sizeof(Claimed<NoiseOfSensorHas, SquareOf<Z>, A>));
   }
   if constexpr (requires(Asked h, const X& x, const Part& part) { h.part_jacobian(x, part); }) {
     using A =
         decltype(std::declval<Asked>().part_jacobian(std::declval<const X&>(), std::declval<const Part&>()));
-    claim<JacobianByPartHas, Expected<dof<Z>, dof<Part>, ScalarOf<Part>>, A>();
+    static_cast<void>(sizeof(Claimed<JacobianByPartHas, Expected<dof<Z>, dof<Part>, ScalarOf<Part>>, A>));
   }
 }
 
@@ -242,6 +168,19 @@ inline constexpr bool explain_sizes = [] {
         explain_conditional_sensor<Model, X, typename Model::Part, Z>();
     }
   }
+  return false;
+}();
+
+/// False; or, of a model that is one in all else (IsModel), the sentence that it has no jacobian() or is not
+/// linear.
+template <class Model, bool IsModel>
+inline constexpr bool explain_jacobian = [] {
+  if constexpr (IsModel) static_cast<void>(sizeof(ModelHasJacobian<Model>));
+  return false;
+}();
+template <class Model, bool IsModel>
+inline constexpr bool explain_linear = [] {
+  if constexpr (IsModel) static_cast<void>(sizeof(ModelIsLinear<Model>));
   return false;
 }();
 

@@ -10,8 +10,10 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
+#include <cairn/core/check.hpp>
 #include <cairn/index/collectors.hpp>
 #include <cairn/index/metric.hpp>
 
@@ -44,9 +46,11 @@ template <class Real, class M, class Search>
   return found;
 }
 
-/// Nearest first. radius >= 0.
+/// Nearest first. Throws Error for a radius that is negative or NaN.
 template <class Real, class M, class Search>
 [[nodiscard]] std::vector<Neighbor<Real>> all_within(Real radius, const M& metric, const Search& search) {
+  if (!(radius >= 0)) [[unlikely]]
+    raise("within: a radius is at least 0, found " + std::to_string(radius));
   std::vector<Neighbor<Real>> found;
   Within<Real> collector(found, largest_reduced(metric, radius));
   search(collector);
