@@ -173,7 +173,7 @@ void Pipeline::choose_calibration() {
   }
   if (!record.on || options_.calibrate == Calibration::drifting) return;
   cairn::KeyframeMapOptions with_rig = map_options(options_);
-  with_rig.rig_sigma = options_.rig_sigma;
+  with_rig.rig = options_.rig;
   map_ = cairn::KeyframeMap(rig_, with_rig);
 }
 
@@ -475,11 +475,10 @@ RunRecord Pipeline::record() {
   record.variance_factor = noise_factors_.poses();
   if (const auto rig = map_.rig_correction()) {
     record.calibration.numbers = rig->mean;
-    for (int i = 0; i < 5; ++i) record.calibration.sigmas(i) = std::sqrt(rig->covariance(i, i));
+    record.calibration.sigmas = rig->covariance.diagonal().cwiseSqrt();
   } else if (options_.calibrate == Calibration::drifting) {
-    record.calibration.numbers = calibration_.drift().state();
-    for (int i = 0; i < 5; ++i)
-      record.calibration.sigmas(i) = std::sqrt(calibration_.drift().covariance()(i, i));
+    record.calibration.numbers.head<5>() = calibration_.drift().state();
+    record.calibration.sigmas.head<5>() = calibration_.drift().covariance().diagonal().cwiseSqrt();
   }
   record.landmarks.reserve(landmarks_.size());
   for (const Landmark& landmark : landmarks_.all())

@@ -63,8 +63,15 @@ struct PipelineOptions {
   StereoMatcherOptions stereo;
 
   Calibration calibrate = Calibration::automatic;
-  double rig_sigma =
-      5e-4;  ///< of each of the rig's five numbers, where they are estimated with the map [rad]
+  /// How far a rig may be off, where it is estimated with the map: what calibrations of recorded rigs are found
+  /// to differ by from one another.
+  cairn::RigSigmas rig = {.rotation = 5e-4,
+                          .direction = 5e-4,
+                          .length = 1e-3,
+                          .focal = 2.5e-3,
+                          .focal_ratio = 2.5e-3,
+                          .centre = 2e-3,
+                          .right_centre = 2e-3};
   cairn::CalibrationDriftOptions calibration = {
       .initial_sigma = 2e-4, .walk_rotation = 1e-5, .walk_baseline = 1e-6};
 

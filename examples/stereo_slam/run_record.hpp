@@ -14,6 +14,7 @@
 #include <vector>
 
 #include <cairn/core/linalg.hpp>
+#include <cairn/geometry/rig_correction.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/vision/image.hpp>
 
@@ -75,7 +76,8 @@ struct SampleFrame {
 struct CalibrationRecord {
   bool on = false;
   std::string why;
-  cairn::Vector<5> numbers = cairn::Vector<5>::Zero(), sigmas = cairn::Vector<5>::Zero();  ///< [rad]
+  /// Of the rig, with the units of geometry/rig_correction.hpp; a sigma of 0: not estimated.
+  cairn::RigState numbers = cairn::RigState::Zero(), sigmas = cairn::RigState::Zero();
 };
 
 struct RunRecord {

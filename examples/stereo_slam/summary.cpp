@@ -225,10 +225,10 @@ std::string summary_json(const RunRecord& run, const Summary& summary) {
   Json& calibration = json["calibration"];
   calibration["on"] = run.calibration.on;
   calibration["why"] = run.calibration.why;
-  const std::array<const char*, 5> names{"rotation_x", "rotation_y", "rotation_z", "baseline_y",
-                                         "baseline_z"};
-  for (int i = 0; run.calibration.on && i < 5; ++i) {
-    Json& one = calibration[std::string(names[static_cast<std::size_t>(i)]) + "_rad"];
+  for (int i = 0; run.calibration.on && i < cairn::rig_numbers; ++i) {
+    if (!(run.calibration.sigmas(i) > 0)) continue;
+    const char* const unit = i < 5 ? "_rad" : i < 8 ? "_relative" : "_focal_lengths";
+    Json& one = calibration[std::string(cairn::rig_number_names[static_cast<std::size_t>(i)]) + unit];
     one["value"] = number(run.calibration.numbers(i));
     one["sigma"] = number(run.calibration.sigmas(i));
   }

@@ -86,7 +86,7 @@ TEST_SUITE("keyframe_map_file") {
       CAPTURE(rig_sigma);
       const auto frames = cairn_test::arena_frames({.frames = 70});
       KeyframeMapOptions options;
-      options.rig_sigma = rig_sigma;
+      options.rig = {.rotation = rig_sigma, .direction = rig_sigma, .focal_ratio = rig_sigma};
       if (rig_sigma == 0) options.max_keyframes = 6;  // so that some have left
       KeyframeMap map = arena_map({frames.begin(), frames.begin() + 60}, options);
       map.set_variance_factors(1.25, 1.5);

@@ -36,6 +36,7 @@ struct ArenaOptions {
   double bias_share = 0;  ///< of the variance, that stays while a landmark stays in view
   double detected = 0.7;  ///< share of the points in view that a frame shows
   int points = 4200;
+  cairn::StereoRig rig = arena_rig();  ///< that sees it
 };
 
 struct ArenaFrame {
@@ -72,7 +73,7 @@ inline std::vector<ArenaFrame> arena_frames(const ArenaOptions& options) {
       p = {centre - 5, height, along};
     points.push_back(p);
   }
-  const cairn::StereoRig rig = arena_rig();
+  const cairn::StereoRig& rig = options.rig;
   const cairn::SE3 T_world_first = arena_pose(options, 0);
   std::vector<cairn::Vector<4>> bias(points.size());
   std::vector<int> last(points.size(), -1000);

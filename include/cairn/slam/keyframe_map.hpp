@@ -76,9 +76,9 @@ struct KeyframeMapOptions {
   double gate_probability = 0.99;  ///< share of good matches that pass the chi-square gate
   RobustLoss loss = RobustLoss::cauchy;
   double loss_scale = 3;  ///< in standard deviations of the whole residual
-  /// Of each of the five numbers by which the rig may be off (geometry/rig_correction.hpp) [rad]; 0: it is
-  /// known exactly. Otherwise they are part of the joint state and are learned with the keyframes.
-  double rig_sigma = 0;
+  /// By how much the rig may be off. Where it is not known exactly, its numbers are part of the joint state
+  /// and are learned with the keyframes.
+  RigSigmas rig;
   double first_sigma = 1e-6;        ///< of the first keyframe, which is the gauge [m, rad]
   double contradiction = 1 - 1e-6;  ///< a list less likely than this is that of no landmark; it is forgotten
   double much_vaguer =
@@ -96,6 +96,7 @@ public:
       : options_(options),
         rig_(rig),
         correction_(rig),
+        estimates_rig_(!options.rig.known()),
         gate_(chi_square_quantile(options.gate_probability, 4)),
         efficiency_(robust_efficiency(options.loss, options.loss_scale, options.gate_probability, gate_, 4)) {
     const char* const fault = fault_of(options, rig);
@@ -138,10 +139,10 @@ public:
       if (poses_.contains(keyframe.block)) ids.push_back(keyframe.block);
     return poses_.covariance(ids);
   }
-  /// The rig's five numbers, where they are estimated and the map has begun.
-  [[nodiscard]] std::optional<Gaussian<Vector<5>>> rig_correction() const {
+  /// The rig's numbers, where they are estimated and the map has begun.
+  [[nodiscard]] std::optional<Gaussian<RigState>> rig_correction() const {
     if (!poses_.contains(rig_block_)) return std::nullopt;
-    return Gaussian<Vector<5>>{poses_.mean(rig_block_), pose_factor_ * poses_.covariance(rig_block_)};
+    return Gaussian<RigState>{poses_.mean(rig_block_), pose_factor_ * poses_.covariance(rig_block_)};
   }
 
   /// Position given the keyframes, with the covariance it had if those were known: what a pose is to be
@@ -195,11 +196,7 @@ public:
     const Matrix<6> P = Matrix<6>::Identity() * (options_.first_sigma * options_.first_sigma);
     const auto added = poses_.add(WorldPose{T_world_camera}, P);
     CAIRN_ASSERT(added.accepted(), "a finite pose with a diagonal covariance is a belief");
-    if (options_.rig_sigma > 0)
-      rig_block_ = poses_
-                       .add(Vector<5>(Vector<5>::Zero()),
-                            Matrix<5>(Matrix<5>::Identity() * (options_.rig_sigma * options_.rig_sigma)))
-                       .id;
+    if (with_rig()) rig_block_ = poses_.add(RigState(RigState::Zero()), options_.rig.covariance()).id;
     enlist(added.id);
   }
 
@@ -218,20 +215,13 @@ public:
   /// Another calibration, from outside: landmarks will be where their lists say under it. Not where the map
   /// estimates the rig itself. O(landmarks).
   void set_rig(const StereoRig& rig) {
-    CAIRN_EXPECTS(options_.rig_sigma == 0, "KeyframeMap::set_rig: this map estimates its rig");
+    CAIRN_EXPECTS(!with_rig(), "KeyframeMap::set_rig: this map estimates its rig");
     CAIRN_EXPECTS(rig.baseline() > 0, "KeyframeMap: the rig needs a baseline");
     rig_ = rig;
     correction_ = RigCorrection(rig);
     std::vector<std::uint32_t> gone;
     for (detail::KeyframeLandmark& one : landmarks_)
-      for (std::size_t i = 0; i < one.count; ++i) {
-        detail::RecordedSighting& s = one.sightings[i];
-        const auto whitened = detail::WhitenedSighting::of(rig, s.left, s.right, s.sigma);
-        if (whitened)
-          s.whitened = *whitened;
-        else if (gone.empty() || gone.back() != one.id)
-          gone.push_back(one.id);
-      }
+      if (!one.whiten(rig)) gone.push_back(one.id);
     for (const std::uint32_t id : gone) drop(id);
     change();
   }
@@ -355,8 +345,8 @@ private:
         options.sightings_a_visit < 1)
       return "KeyframeMap: a list has one to six sightings, and one a visit at least";
     if (options.max_keyframes < 4) return "KeyframeMap: expected room for four keyframes";
-    if (!(options.rig_sigma >= 0 && std::isfinite(options.rig_sigma)))
-      return "KeyframeMap: a rig's sigma is not negative";
+    if (!(options.rig.each().minCoeff() >= 0) || !all_finite(options.rig.each()))
+      return "KeyframeMap: a rig's sigmas are finite and not negative";
     if (!(options.loss_scale > 0 && options.first_sigma > 0) || options.min_matches < 3)
       return "KeyframeMap: scales and sigmas are positive, and a pose needs three matches";
     const auto is_share = [](double p) { return p > 0 && p < 1; };
@@ -377,6 +367,8 @@ private:
   [[nodiscard]] BlockId<WorldPose> block_of(const detail::KeyframeLandmark& one, std::size_t i) const {
     return keyframes_[one.sightings[i].keyframe].block;
   }
+  /// Whether the rig is estimated.
+  [[nodiscard]] bool with_rig() const { return estimates_rig_; }
   void change() { ++epoch_; }
   void enlist(BlockId<WorldPose> block) {
     keyframes_.push_back({block, 0, {}, std::nullopt, 0});
@@ -394,13 +386,11 @@ private:
   }
   [[nodiscard]] bool solve(detail::KeyframeLandmark& one) {
     return one.solve([this](std::uint32_t keyframe) -> const detail::RigView& { return view_of(keyframe); },
-                     options_.rig_sigma > 0);
+                     with_rig());
   }
   [[nodiscard]] detail::RigView view_from(const SE3& T_world_camera) const {
     detail::RigView view(T_world_camera, rig_);
-    if (options_.rig_sigma > 0)
-      view.by_direction = -rig_.baseline() * transposed_product(rig_.T_left_right.rotation().matrix(),
-                                                                correction_.direction_jacobian());
+    if (with_rig()) view.derive(correction_);
     return view;
   }
 
@@ -411,7 +401,8 @@ private:
     detail::KeyframeLandmark& one = landmarks_[found->second];
     if (one.epoch == epoch_) return &one;
     one.epoch = epoch_;
-    if (solve(one) && one.chi_squared <= pixel_factor_ * contradiction(one.count)) return &one;
+    const bool seen = !with_rig() || one.whiten(rig_);
+    if (seen && solve(one) && one.chi_squared <= pixel_factor_ * contradiction(one.count)) return &one;
     drop(id);
     return nullptr;
   }
@@ -474,7 +465,7 @@ private:
   /// then under their solution and with what that leaves uncertain.
   void judge(const SE3& T, Work& work) {
     const detail::RigView view = view_from(T);
-    const bool with_rig = options_.rig_sigma > 0;
+    const bool with_rig = this->with_rig();
     for (Entry& entry : work.entries) {
       const detail::KeyframeLandmark& one = landmarks_[entry.landmark];
       entry.statistics = {};
@@ -494,7 +485,7 @@ private:
     Vector<3> moved = Vector<3>::Zero();
     for (std::size_t i = 0; i < one.count; ++i)
       moved += product(one.F[i], moved_with_world(one.x, work.solution.step.data() + 6 * entry.place[i]));
-    if (options_.rig_sigma > 0) return chi_squared_with_rig(entry, one, work, moved);
+    if (with_rig()) return chi_squared_with_rig(entry, one, work, moved);
     const Vector<3> Am = product(s.A, moved);
     entry.at_solution = {s.A, s.b - Am, s.squares - 2 * s.b.dot(moved) + moved.dot(Am)};
     const Matrix<3> uncertain =
@@ -507,10 +498,10 @@ private:
                                             const Work& work, Vector<3> moved) const {
     const detail::PointStatistics& s = entry.statistics;
     const detail::RigStatistics& rig = entry.rig;
-    const Vector<5> c = work.solution.step.segment<5>(work.solution.step.size() - 11);
+    const RigState c = work.solution.step.segment<rig_numbers>(work.solution.step.size() - 6 - rig_numbers);
     moved += product(one.B, c);
     const Vector<3> Am = product(s.A, moved), Ec = product(rig.E, c);
-    const Vector<5> Dc = product(rig.D, c);
+    const RigState Dc = product(rig.D, c);
     entry.at_solution = {
         s.A, s.b - Am - Ec,
         s.squares - 2 * (s.b.dot(moved) + rig.u.dot(c)) + moved.dot(Am) + 2 * moved.dot(Ec) + c.dot(Dc)};
@@ -523,7 +514,7 @@ private:
   /// The equations of the matches within the gate, weighted so that together they are worth what the loss and
   /// the gate leave of them. Returns how many those are.
   std::size_t linearise(Work& work) {
-    const bool with_rig = options_.rig_sigma > 0;
+    const bool with_rig = this->with_rig();
     equations_.open(work.keyframes.size(), with_rig);
     double weights = 0;
     std::size_t agree = 0;
@@ -660,9 +651,10 @@ private:
   KeyframeMapOptions options_;
   StereoRig rig_;  // as it is believed to be
   RigCorrection correction_;
+  bool estimates_rig_ = false;
   double gate_, efficiency_;
-  JointGaussian<WorldPose, Vector<5>> poses_;
-  BlockId<Vector<5>> rig_block_;     // where the rig is estimated
+  JointGaussian<WorldPose, RigState> poses_;
+  BlockId<RigState> rig_block_;     // where the rig is estimated
   std::vector<Keyframe> keyframes_;  // all that ever were
   std::vector<detail::KeyframeLandmark> landmarks_;
   std::unordered_map<std::uint32_t, std::size_t> place_;

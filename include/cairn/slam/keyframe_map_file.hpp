@@ -70,7 +70,9 @@ void fields_of_options(Options& o, const Field& field) {
   field(o.visit_gap);
   field(o.gate_probability);
   field(o.loss_scale);
-  field(o.rig_sigma);
+  for (auto* sigma : {&o.rig.rotation, &o.rig.direction, &o.rig.length, &o.rig.focal, &o.rig.focal_ratio,
+                      &o.rig.centre, &o.rig.right_centre})
+    field(*sigma);
   field(o.first_sigma);
   field(o.contradiction);
   field(o.much_vaguer);
@@ -215,12 +217,12 @@ private:
       for (std::size_t i = 0; i < saw; ++i) map.keyframes_.back().saw.push_back(in.get<std::uint32_t>());
     }
     const bool with_rig = in.get<std::uint8_t>() != 0;
-    if (with_rig != (map.options_.rig_sigma > 0 && keyframes > 0))
-      raise(in.name() + ": the rig is estimated where its sigma is positive, and only there");
+    if (with_rig != (map.with_rig() && keyframes > 0))
+      raise(in.name() + ": the rig is estimated where its sigmas are positive, and only there");
     if (with_rig) {
-      Vector<5> numbers;
+      RigState numbers;
       fields_of_matrix(numbers, GetField{&in});
-      map.rig_block_ = map.poses_.add(numbers, Matrix<5>(Matrix<5>::Identity())).id;
+      map.rig_block_ = map.poses_.add(numbers, Matrix<rig_numbers>(Matrix<rig_numbers>::Identity())).id;
       map.rig_ = map.correction_.rig(numbers);
     }
     const auto size = static_cast<std::size_t>(map.poses_.dof());

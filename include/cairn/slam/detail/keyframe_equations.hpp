@@ -12,7 +12,7 @@
 ///   [I + L^T Q_ss L, L^T Q_sT; ., Q_TT] (y, xi_T) = (L^T q_s, q_T):                       (3)
 /// no inverse of P is needed, and a keyframe known exactly does no harm.
 ///
-/// The rig's five numbers c may be of the party: residuals then see d + B c and, directly, J_c c
+/// The rig's numbers c may be of the party: residuals then see d + B c and, directly, J_c c
 /// (whitened_sighting.hpp). Order: keyframes, rig, camera.
 #pragma once
 
@@ -42,7 +42,7 @@ public:
   void open(std::size_t keyframes, bool with_rig = false) {
     size_ = keyframes + 1;
     with_rig_ = with_rig;
-    rig_.assign(with_rig ? size_ : 0, Matrix<6, 5>::Zero());
+    rig_.assign(with_rig ? size_ : 0, Matrix<6, rig_numbers>::Zero());
     rig_information_.setZero();
     rig_gradient_.setZero();
     blocks_.assign(size_ * size_, Matrix<6>::Zero());
@@ -72,14 +72,14 @@ public:
   /// What the match says of the rig, besides.
   void add_rig(const KeyframeLandmark& landmark, std::span<const std::uint32_t> place,
                const WeighedSighting& seen, const RigStatistics& rig, double weight) {
-    const Matrix<3, 5> GE = product(seen.G, rig.E),
+    const Matrix<3, rig_numbers> GE = product(seen.G, rig.E),
                        K = product(seen.N, landmark.B) + GE;  // J^T W (J B + J_c)
     for (std::size_t i = 0; i < landmark.count; ++i)
       add_rig_block(place[i], weight * transposed_product(landmark.F[i], K), landmark.x);
     add_rig_block(static_cast<std::uint32_t>(size_ - 1), -weight * K, landmark.x);
-    const Matrix<3, 5> SE = product(landmark.S, rig.E);
-    const Matrix<5> direct = rig.D - transposed_product(SE, GE);
-    rig_information_ += weight * symmetrised(Matrix<5>(transposed_product(landmark.B, K) +
+    const Matrix<3, rig_numbers> SE = product(landmark.S, rig.E);
+    const Matrix<rig_numbers> direct = rig.D - transposed_product(SE, GE);
+    rig_information_ += weight * symmetrised(Matrix<rig_numbers>(transposed_product(landmark.B, K) +
                                                        transposed_product(GE, landmark.B) + direct));
     rig_gradient_ +=
         weight * (transposed_product(landmark.B, seen.g) + rig.u - transposed_product(SE, seen.g));
@@ -89,7 +89,7 @@ public:
   void scale(double factor) {
     for (Matrix<6>& block : blocks_) block *= factor;
     for (Vector<6>& part : gradient_) part *= factor;
-    for (Matrix<6, 5>& block : rig_) block *= factor;
+    for (Matrix<6, rig_numbers>& block : rig_) block *= factor;
     rig_information_ *= factor;
     rig_gradient_ *= factor;
   }
@@ -128,30 +128,30 @@ public:
         Q.block<6, 6>(row_of(b), row_of(a)) = blocks_[a * size_ + b].transpose();
       }
     if (!with_rig_) return Q;
-    const Eigen::Index rig = n - 11;
+    const Eigen::Index rig = n - 6 - rig_numbers;
     for (std::size_t a = 0; a < size_; ++a) {
-      Q.block<6, 5>(row_of(a), rig) = rig_[a];
-      Q.block<5, 6>(rig, row_of(a)) = rig_[a].transpose();
+      Q.block<6, rig_numbers>(row_of(a), rig) = rig_[a];
+      Q.block<rig_numbers, 6>(rig, row_of(a)) = rig_[a].transpose();
     }
-    Q.block<5, 5>(rig, rig) = rig_information_;
+    Q.block<rig_numbers, rig_numbers>(rig, rig) = rig_information_;
     return Q;
   }
   [[nodiscard]] Vector<dynamic> gradient() const {
     Vector<dynamic> q(row_of(size_ - 1) + 6);
     for (std::size_t a = 0; a < size_; ++a) q.segment<6>(row_of(a)) = gradient_[a];
-    if (with_rig_) q.segment<5>(q.size() - 11) = rig_gradient_;
+    if (with_rig_) q.segment<rig_numbers>(q.size() - 6 - rig_numbers) = rig_gradient_;
     return q;
   }
 
 private:
   /// Keyframes one after the other, the camera behind the rig.
   [[nodiscard]] Eigen::Index row_of(std::size_t block) const noexcept {
-    return 6 * static_cast<Eigen::Index>(block) + (with_rig_ && block + 1 == size_ ? 5 : 0);
+    return 6 * static_cast<Eigen::Index>(block) + (with_rig_ && block + 1 == size_ ? rig_numbers : 0);
   }
 
   /// G^T K of (1), for the rig's columns.
-  void add_rig_block(std::uint32_t a, const Matrix<3, 5>& K, const Vector<3>& x) {
-    for (int c = 0; c < 5; ++c)
+  void add_rig_block(std::uint32_t a, const Matrix<3, rig_numbers>& K, const Vector<3>& x) {
+    for (int c = 0; c < rig_numbers; ++c)
       for (int i = 0; i < 3; ++i) {
         const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
         rig_[a](i, c) += K(i, c);
@@ -189,9 +189,9 @@ private:
   std::vector<Matrix<6>> blocks_;  // of rows a and columns b >= a, row by row
   std::vector<Vector<6>> gradient_;
   bool with_rig_ = false;
-  std::vector<Matrix<6, 5>> rig_;  // of rows a and the rig's columns
-  Matrix<5> rig_information_ = Matrix<5>::Zero();
-  Vector<5> rig_gradient_ = Vector<5>::Zero();
+  std::vector<Matrix<6, rig_numbers>> rig_;  // of rows a and the rig's columns
+  Matrix<rig_numbers> rig_information_ = Matrix<rig_numbers>::Zero();
+  RigState rig_gradient_ = RigState::Zero();
 };
 
 /// Covariance of d of (1) by the solution's: how far landmark and camera may still be from where they are

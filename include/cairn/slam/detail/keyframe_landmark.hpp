@@ -42,7 +42,8 @@ struct KeyframeLandmark {
   Vector<3> x = Vector<3>::Zero();  ///< world [m]
   Matrix<3> S = Matrix<3>::Zero();  ///< covariance of x if the keyframes were known [m^2]
   std::array<Matrix<3>, most_sightings> F;  ///< (1)
-  Matrix<3, 5> B = Matrix<3, 5>::Zero();    ///< d x / d the rig's five numbers, where those are estimated
+  Matrix<3, rig_numbers> B =
+      Matrix<3, rig_numbers>::Zero();  ///< d x / d the rig's numbers, where those are estimated
   double chi_squared = 0;                   ///< of the list, 4 count - 3 degrees of freedom
 
   /// x, S, F and, `with_rig`, B from the list: Gauss-Newton from the present x. view(keyframe) is where that
@@ -82,6 +83,17 @@ struct KeyframeLandmark {
     for (std::size_t i = 0; i < count; ++i)
       if (!sightings[i].whitened.add(view(sightings[i].keyframe), x, unused, rig)) return false;
     B = -product(S, rig.E);
+    return true;
+  }
+
+  /// The list under another calibration. False where a pixel has no ray under it.
+  [[nodiscard]] bool whiten(const StereoRig& rig) {
+    for (std::size_t i = 0; i < count; ++i) {
+      RecordedSighting& s = sightings[i];
+      const auto whitened = WhitenedSighting::of(rig, s.left, s.right, s.sigma);
+      if (!whitened) return false;
+      s.whitened = *whitened;
+    }
     return true;
   }
 

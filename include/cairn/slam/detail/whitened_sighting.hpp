@@ -9,10 +9,12 @@
 /// evaluated once, at the observation.
 #pragma once
 
+#include <array>
 #include <optional>
 
 #include <cairn/core/linalg.hpp>
 #include <cairn/geometry/camera.hpp>
+#include <cairn/geometry/rig_correction.hpp>
 #include <cairn/geometry/stereo_rig.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
@@ -23,9 +25,9 @@ namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 struct RigView {
   Matrix<3> R_left_world, R_right_world;
   Vector<3> camera, t_right_left;
-  Matrix<3, 2> by_direction =
-      Matrix<3, 2>::Zero();  ///< d point in the right frame / d the baseline's direction
-  double nearest;            ///< depth below which a point is not in view of both cameras
+  Matrix<3, 2> by_direction = Matrix<3, 2>::Zero();  ///< d point in the right frame / d baseline's direction
+  std::array<Vector<2>, 2> nominal_focal{Vector<2>::Zero(), Vector<2>::Zero()};  ///< left, right [pixels]
+  double nearest;  ///< depth below which a point is not in view of both cameras
 
   RigView(const SE3& T_world_camera, const StereoRig& rig)
       : R_left_world(transposed(T_world_camera.rotation().matrix())),
@@ -33,6 +35,15 @@ struct RigView {
         camera(T_world_camera.translation()),
         t_right_left(rig.T_left_right.inverse().translation()),
         nearest(0.05 * rig.baseline()) {}
+
+  /// Makes it ready for what depends on the numbers of a rig that is off.
+  void derive(const RigCorrection& correction) {
+    const StereoRig& nominal = correction.nominal();
+    const Matrix<3> R_right_left = product_transposed(R_right_world, R_left_world);
+    by_direction = -t_right_left.norm() * product(R_right_left, correction.direction_jacobian());
+    nominal_focal[0] = {nominal.left.fx(), nominal.left.fy()};
+    nominal_focal[1] = {nominal.right.fx(), nominal.right.fy()};
+  }
 };
 
 /// A, b and r^T r.
@@ -42,12 +53,20 @@ struct PointStatistics {
   double squares = 0;
 };
 
-/// What it says of the rig's five numbers c (geometry/rig_correction.hpp): with J_c = d h / d c, which only
-/// the right camera has, E = J^T J_c, D = J_c^T J_c, u = J_c^T r.
+/// What it says of the rig's numbers c (geometry/rig_correction.hpp): with J_c = d h / d c, E = J^T J_c,
+/// D = J_c^T J_c, u = J_c^T r.
 struct RigStatistics {
-  Matrix<3, 5> E = Matrix<3, 5>::Zero();
-  Matrix<5> D = Matrix<5>::Zero();
-  Vector<5> u = Vector<5>::Zero();
+  Matrix<3, rig_numbers> E = Matrix<3, rig_numbers>::Zero();
+  Matrix<rig_numbers> D = Matrix<rig_numbers>::Zero();
+  RigState u = RigState::Zero();
+};
+
+/// How the point in a camera's frame and its pixel move with those of the rig's numbers that this camera has.
+struct RigDerivatives {
+  static constexpr int of_point = 6;  ///< the first numbers move the point
+  bool right = false;
+  Matrix<3, of_point> point = Matrix<3, of_point>::Zero();  ///< only in the right frame
+  Vector<2> nominal_focal;                                  ///< [pixels]
 };
 
 /// One camera's observation: normalised coordinates, and d pixel / d normalised over sigma.
@@ -60,12 +79,14 @@ public:
     WhitenedPixel result;
     result.seen_ = seen->normalised;
     result.W_ = seen->J_pixel / sigma;
+    result.from_centre_ = Vector<2>(pixel(0) - camera.cx(), pixel(1) - camera.cy()) / sigma;
+    result.inverse_sigma_ = 1 / sigma;
     return result;
   }
 
   /// Adds this camera's part for a point at p in its frame, R from world axes. False beside the view.
   [[nodiscard]] bool add(const Matrix<3>& R, const Vector<3>& p, double nearest, PointStatistics& s,
-                         const Matrix<3, 5>* by_rig = nullptr, RigStatistics* rig = nullptr) const noexcept {
+                         const RigDerivatives* by_rig = nullptr, RigStatistics* rig = nullptr) const noexcept {
     constexpr double widest = 10;  // tangent of 84 degrees
     const double reach = widest * p(2);
     if (!(p(2) > nearest && p(0) < reach && -p(0) < reach && p(1) < reach && -p(1) < reach)) return false;
@@ -73,32 +94,47 @@ public:
     const double ex = seen_(0) - x, ey = seen_(1) - y;
     for (int i = 0; i < 2; ++i) {
       const double r = W_(i, 0) * ex + W_(i, 1) * ey;
-      const double j0 = W_(i, 0) * inverse, j1 = W_(i, 1) * inverse, j2 = -(j0 * x + j1 * y);
+      const Vector<3> j(W_(i, 0) * inverse, W_(i, 1) * inverse, -(W_(i, 0) * x + W_(i, 1) * y) * inverse);
       double row[3];
-      for (int k = 0; k < 3; ++k) row[k] = j0 * R(0, k) + j1 * R(1, k) + j2 * R(2, k);
+      for (int k = 0; k < 3; ++k) row[k] = j(0) * R(0, k) + j(1) * R(1, k) + j(2) * R(2, k);
       s.squares += r * r;
       for (int c = 0; c < 3; ++c) {
         s.b(c) += r * row[c];
         for (int k = 0; k < 3; ++k) s.A(k, c) += row[k] * row[c];
       }
-      if (by_rig == nullptr) continue;
-      for (int c = 0; c < 5; ++c) {
-        const double of_rig = j0 * (*by_rig)(0, c) + j1 * (*by_rig)(1, c) + j2 * (*by_rig)(2, c);
-        rig->u(c) += r * of_rig;
-        for (int k = 0; k < 3; ++k) rig->E(k, c) += row[k] * of_rig;
-        for (int k = 0; k <= c; ++k) {
-          const double other = j0 * (*by_rig)(0, k) + j1 * (*by_rig)(1, k) + j2 * (*by_rig)(2, k);
-          rig->D(k, c) += other * of_rig;
-          if (k != c) rig->D(c, k) += other * of_rig;
-        }
-      }
+      if (by_rig != nullptr) add_rig(i, r, row, j, *by_rig, *rig);
     }
     return true;
   }
 
 private:
+  /// The part of the residual r in direction i, whose derivative by the point is `row` in world axes and j in
+  /// the camera's.
+  void add_rig(int i, double r, const double (&row)[3], const Vector<3>& j, const RigDerivatives& by,
+               RigStatistics& rig) const noexcept {
+    double of_rig[rig_numbers] = {};
+    int first = RigDerivatives::of_point;
+    const double centre = by.nominal_focal(i) * inverse_sigma_;
+    of_rig[6] = from_centre_(i);
+    of_rig[8 + i] = centre;
+    if (by.right) {
+      first = 0;
+      for (int c = 0; c < RigDerivatives::of_point; ++c)
+        of_rig[c] = j(0) * by.point(0, c) + j(1) * by.point(1, c) + j(2) * by.point(2, c);
+      of_rig[7] = from_centre_(i);
+      of_rig[10 + i] = centre;
+    }
+    for (int c = first; c < rig_numbers; ++c) {
+      rig.u(c) += r * of_rig[c];
+      for (int k = 0; k < 3; ++k) rig.E(k, c) += row[k] * of_rig[c];
+      for (int k = first; k < rig_numbers; ++k) rig.D(k, c) += of_rig[k] * of_rig[c];
+    }
+  }
+
   Vector<2> seen_ = Vector<2>::Zero();
   Matrix<2> W_ = Matrix<2>::Zero();
+  Vector<2> from_centre_ = Vector<2>::Zero();  // of the pixel, over sigma
+  double inverse_sigma_ = 0;
 };
 
 /// Both cameras' observation of a point.
@@ -129,11 +165,15 @@ public:
                          RigStatistics& rig) const noexcept {
     const Vector<3> y = x - view.camera;
     const Vector<3> p = product(view.R_right_world, y) + view.t_right_left;
-    Matrix<3, 5> by_rig;  // p = exp(-w) R^T (. - t)
-    put(by_rig, 0, 0, skew(p));
-    put(by_rig, 0, 3, view.by_direction);
-    return left_.add(view.R_left_world, product(view.R_left_world, y), view.nearest, s) &&
-           right_.add(view.R_right_world, p, view.nearest, s, &by_rig, &rig);
+    RigDerivatives left, right;
+    left.nominal_focal = view.nominal_focal[0];
+    right.nominal_focal = view.nominal_focal[1];
+    right.right = true;  // p = exp(-w) R^T (. - t)
+    put(right.point, 0, 0, skew(p));
+    put(right.point, 0, 3, view.by_direction);
+    put(right.point, 0, 5, view.t_right_left);
+    return left_.add(view.R_left_world, product(view.R_left_world, y), view.nearest, s, &left, &rig) &&
+           right_.add(view.R_right_world, p, view.nearest, s, &right, &rig);
   }
 
 private:
