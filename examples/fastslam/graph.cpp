@@ -74,6 +74,8 @@ private:
     const Matrix<3> back = step.inverse().adjoint();
     moved_.covariance = cairn::symmetrised(Matrix<3>(back * moved_.covariance * back.transpose() + p));
     moved_.mean = moved_.mean * step;
+    if (!cairn::all_finite(moved_.covariance) || !std::isfinite(moved_.mean.x() + moved_.mean.y()))
+      lines_.fail("motions that remain finite together");
     newest_ = to;
     ++poses_;
     if (!log_.frames.empty())

@@ -2,7 +2,12 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <initializer_list>
 #include <set>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <cairn/core/check.hpp>
 #include <cairn/filter/extended.hpp>
@@ -21,33 +26,45 @@ using cairn::Vector;
 constexpr std::size_t most_columns = 5;
 using Row = std::vector<double>;
 
-/// Rows of the first `columns` numbers of each line, by times that do not fall where the first is one.
-std::vector<Row> read_rows(const std::filesystem::path& path, std::size_t columns, bool timed) {
+/// What a file's first columns are: times that do not fall, the numbers of subjects or bar codes (whole,
+/// below 2^24), any other numbers, or distances, which are not negative.
+enum class Column { time, identity, number, distance };
+
+/// Rows of the first numbers of each line.
+std::vector<Row> read_rows(const std::filesystem::path& path, std::initializer_list<Column> columns) {
   cairn::TextLines lines(path, "a file of the UTIAS set");
   std::vector<Row> rows;
   while (lines.next('#')) {
     double numbers[most_columns];
-    if (lines.numbers(' ', numbers, columns) < columns) lines.fail(std::to_string(columns) + " numbers");
-    Row row(numbers, numbers + columns);
-    if (timed && !rows.empty() && row[0] < rows.back()[0]) lines.fail("times that do not fall");
-    rows.push_back(std::move(row));
+    if (lines.numbers(' ', numbers, columns.size()) < columns.size())
+      lines.fail(std::to_string(columns.size()) + " numbers");
+    for (std::size_t i = 0; i < columns.size(); ++i) {
+      const double n = numbers[i];
+      const Column kind = columns.begin()[i];
+      if (kind == Column::time && !rows.empty() && n < rows.back()[i]) lines.fail("times that do not fall");
+      if (kind == Column::identity && !(n >= 0 && n < Map::most_identity && n == std::floor(n)))
+        lines.fail("a whole number from 0 to below 2^24 in column " + std::to_string(i + 1));
+      if (kind == Column::distance && n < 0) lines.fail("a distance that is not negative");
+    }
+    rows.emplace_back(numbers, numbers + columns.size());
   }
   return rows;
 }
 
-/// Of one robot's four files.
+/// Of one robot's files and those of its set.
 struct Files {
+  using enum Column;
   std::vector<Row> odometry, sightings, truth;
   std::map<int, std::uint32_t> subject_of;  // by bar code
   std::map<std::uint32_t, Vector<2>> landmarks;
 
   Files(const std::filesystem::path& folder, const std::string& robot)
-      : odometry(read_rows(folder / (robot + "_Odometry.dat"), 3, true)),
-        sightings(read_rows(folder / (robot + "_Measurement.dat"), 4, true)),
-        truth(read_rows(folder / (robot + "_Groundtruth.dat"), 4, true)) {
-    for (const Row& r : read_rows(folder / "Barcodes.dat", 2, false))
+      : odometry(read_rows(folder / (robot + "_Odometry.dat"), {time, number, number})),
+        sightings(read_rows(folder / (robot + "_Measurement.dat"), {time, identity, distance, number})),
+        truth(read_rows(folder / (robot + "_Groundtruth.dat"), {time, number, number, number})) {
+    for (const Row& r : read_rows(folder / "Barcodes.dat", {identity, identity}))
       subject_of[static_cast<int>(r[1])] = static_cast<std::uint32_t>(r[0]);
-    for (const Row& r : read_rows(folder / "Landmark_Groundtruth.dat", 3, false))
+    for (const Row& r : read_rows(folder / "Landmark_Groundtruth.dat", {identity, number, number}))
       landmarks[static_cast<std::uint32_t>(r[0])] = Vector<2>(r[1], r[2]);
   }
 };
@@ -55,12 +72,16 @@ struct Files {
 /// Odometry turned into motions between frames.
 class Wheels {
 public:
-  Wheels(LandmarkLog& log, double begin) : log_(log), time_(begin) { reset(); }
+  Wheels(LandmarkLog& log, std::filesystem::path file, double begin)
+      : log_(log), file_(std::move(file)), time_(begin) {
+    reset();
+  }
 
   void move(double to) {
     if (to <= time_) return;
     const cairn::Status status = cairn::Extended{}.predict(moved_, process, to - time_, control_);
-    if (status != cairn::Status::accepted) cairn::raise(std::string("odometry: ") + explain(status));
+    if (status != cairn::Status::accepted)
+      cairn::raise(file_.string() + ": the motion until " + cairn::shortest(to) + " s: " + explain(status));
     time_ = to;
   }
   void steer(double speed, double turn) { control_ = Vector<2>(speed, turn); }
@@ -82,6 +103,7 @@ private:
   void reset() { moved_ = {SE2(), cairn::Matrix<3>::Zero()}; }
 
   LandmarkLog& log_;
+  std::filesystem::path file_;  // for messages
   double time_;
   Vector<2> control_ = Vector<2>::Zero();
   cairn::Gaussian<SE2> moved_;
@@ -102,7 +124,7 @@ LandmarkLog read_mrclam(const std::filesystem::path& folder, int robot) {
   };
   for (const Row& r : files.truth) log.truth.push_back({r[0], {r[1], r[2], r[3]}});
   std::set<int> unknown;
-  Wheels wheels(log, files.odometry.front()[0]);
+  Wheels wheels(log, folder / (name + "_Odometry.dat"), files.odometry.front()[0]);
   std::size_t next = 0;
   for (const Row& o : files.odometry) {
     for (; next < files.sightings.size() && files.sightings[next][0] <= o[0]; ++next) {

@@ -92,7 +92,8 @@ private:
   cairn::BinaryWriter out_;
 };
 
-/// Throws cairn::Error, naming the file, for what is no such file, is damaged, or ends before the values do.
+/// Throws cairn::Error, naming the file, for what is no such file, is damaged, ends before the values do, or
+/// has a double that is not finite.
 class Reader {
 public:
   static constexpr bool reads = true;
@@ -112,6 +113,7 @@ private:
   void take(T& number) {
     number = static_cast<T>(in_.get<InFile<T>>());
   }
+  void take(double& number) { number = in_.finite(); }
   template <class T>
   void take(std::vector<T>& values) {
     constexpr std::size_t least_bytes = 1;

@@ -4,9 +4,13 @@
 // Mapper::save and Mapper::loaded: all that a mapper is, so that going on from a file is going on.
 #include <algorithm>
 #include <array>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <limits>
 #include <map>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -112,9 +116,11 @@ struct TileStore {
   }
 
   [[nodiscard]] std::vector<cairn::SharedTiles<Cell>> grids(const Reader& reader) const {
+    expect_near_each_other(reader);
     std::vector<cairn::SharedTiles<Cell>> single(tiles.size()), all(of_grid.size());
     for (std::size_t i = 0; i < tiles.size(); ++i) {
       if (tiles[i].cells.size() != cairn::tile_cells) reader.refuse("a tile of the map has another size");
+      if (!std::ranges::all_of(tiles[i].cells, possible)) reader.refuse("a cell has more hits than visits");
       std::ranges::copy(tiles[i].cells, single[i].writable_tile(tiles[i].address).begin());
     }
     for (std::size_t g = 0; g < all.size(); ++g)
@@ -126,8 +132,61 @@ struct TileStore {
   }
 
 private:
+  static bool possible(const Cell& cell) {
+    if constexpr (requires { cell.hits; }) return cell.hits <= cell.visits;
+    return true;
+  }
+
+  /// Tiles far apart cost memory in between, once for each grid: 2^24 places (128 MB), 19 km in square at 5
+  /// cm for thirty grids, are more than any building and less than what a made-up file could ask for.
+  void expect_near_each_other(const Reader& reader) const {
+    if (tiles.empty()) return;
+    constexpr double side = 16, most = 1 << 24;  // tiles of a block; places
+    const auto by_column = [](const Tile& t) { return t.address.column; };
+    const auto by_row = [](const Tile& t) { return t.address.row; };
+    const auto [left, right] = std::ranges::minmax(tiles, {}, by_column);
+    const auto [low, high] = std::ranges::minmax(tiles, {}, by_row);
+    const auto blocks = [](std::int32_t from, std::int32_t to) {
+      return static_cast<double>(std::int64_t{to} - from) / side + 2;
+    };
+    const double area =
+        blocks(left.address.column, right.address.column) * blocks(low.address.row, high.address.row);
+    if (!(area * static_cast<double>(of_grid.size()) <= most))
+      reader.refuse("the map's tiles lie too far apart");
+  }
+
   std::map<const void*, std::uint32_t> known_;  // looked up only; its order decides nothing
 };
+
+void expect_covariance(const Reader& reader, const cairn::Matrix<3>& covariance) {
+  try {
+    static_cast<void>(cairn::Gaussian<cairn::SE2>::checked(cairn::SE2(), covariance));
+  } catch (const cairn::Error& error) {
+    reader.refuse(error.what());
+  }
+}
+
+/// A path of `poses` for every particle, each pose with its place on it; parents before their children.
+void expect_paths(const Reader& reader, const cairn::PathsRecord<cairn::SE2>& record, std::size_t poses) {
+  std::vector<std::uint64_t> length;
+  for (const auto& node : record.nodes) {
+    const bool first = node.parent == std::numeric_limits<std::uint32_t>::max();
+    if (!first && node.parent >= length.size()) reader.refuse("a pose comes before the one it follows");
+    length.push_back(first ? 1 : length[node.parent] + 1);
+    if (node.pose.step + 1 != length.back()) reader.refuse("a pose is not where it stands on its path");
+    expect_covariance(reader, node.pose.drawn_from.covariance);
+  }
+  for (const auto& particle : record.particles) {
+    if (particle.node >= length.size() || length[particle.node] != poses)
+      reader.refuse("a particle's path is not as long as the map's");
+    if (particle.regime > 1) reader.refuse("a particle drives neither forwards nor backwards");
+  }
+  if (record.step + 1 != poses) reader.refuse("the steps are not as many as those of the paths");
+}
+
+bool growing(const std::vector<double>& numbers) {
+  return std::ranges::is_sorted(numbers) && (numbers.empty() || numbers.front() >= 0);
+}
 
 }  // namespace
 
@@ -137,6 +196,21 @@ void Mapper::plain_parts(Archive& archive, Mapper& m) {
   archive(m.steps_, m.points_, m.travelled_, m.scans_, m.loops_);
   archive(m.motion_.forwards, m.motion_.backwards, m.motion_.distance, m.motion_.angle, m.motion_.stood);
   archive(m.looked_, m.asked_, m.asked_at_);
+}
+
+void Mapper::expect_sound(const Reader& reader) const {
+  if (scans_.empty() || travelled_.size() != steps_.size() + 1 || points_.size() != steps_.size())
+    reader.refuse("the map has not as many scans as steps");
+  if (steps_.empty() || steps_.front().scan != 0 || steps_.back().scan >= scans_.size() ||
+      std::ranges::adjacent_find(steps_, std::ranges::greater_equal{}, &StepRecord::scan) != steps_.end())
+    reader.refuse("the steps are not in the order of the scans");
+  if (!growing(travelled_) || !(motion_.distance >= 0 && motion_.angle >= 0))
+    reader.refuse("the way travelled is not one");
+  for (const Loop& loop : loops_) {
+    if (loop.first >= loop.last || loop.last >= travelled_.size())
+      reader.refuse("a loop joins poses that there are not");
+    expect_covariance(reader, loop.covariance);
+  }
 }
 
 void Mapper::save(const std::filesystem::path& path) const {
@@ -161,6 +235,15 @@ void Mapper::save(const std::filesystem::path& path) const {
 Mapper Mapper::loaded(const std::filesystem::path& path, const MapRequest& wanted) {
   const std::string bytes = cairn::read_file(path, "a map of grid_slam");
   Reader reader(bytes, kind, version, path.string());
+  try {
+    return loaded(reader, wanted);
+  } catch (const cairn::Error& error) {  // of what the numbers were given to
+    if (std::string_view(error.what()).starts_with(path.string())) throw;
+    reader.refuse(error.what());
+  }
+}
+
+Mapper Mapper::loaded(Reader& reader, const MapRequest& wanted) {
   MapperOptions options;
   cairn::PathsRecord<cairn::SE2> record;
   TileStore<cairn::OccupancyCell> cells;
@@ -178,6 +261,9 @@ Mapper Mapper::loaded(const std::filesystem::path& path, const MapRequest& wante
   Mapper mapper(options);
   plain_parts(reader, mapper);
   reader.expect_end();
+  if (record.particles.size() != options.particles) reader.refuse("the map has other particles than it says");
+  mapper.expect_sound(reader);
+  expect_paths(reader, record, mapper.travelled_.size());
   auto cell_grids = cells.grids(reader);
   auto field_grids = fields.grids(reader);
   if (cell_grids.size() != field_grids.size()) reader.refuse("the map has cells without a distance field");

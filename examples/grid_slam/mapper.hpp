@@ -94,6 +94,8 @@ struct PlaceWindow {
   double left = 0, bottom = 0, right = 0, top = 0;
 };
 
+class Reader;
+
 /// Takes scans one by one.
 class Mapper {
 public:
@@ -139,6 +141,8 @@ private:
 
   template <class Archive>
   static void plain_parts(Archive& archive, Mapper& mapper);
+  [[nodiscard]] static Mapper loaded(Reader& reader, const MapRequest& wanted);
+  void expect_sound(const Reader& reader) const;  // of what was read, but for map and paths
   void begin(const cairn::StampedScan& scan);
   [[nodiscard]] cairn::Gaussian<cairn::SE2> place_in_window(const cairn::StampedScan& scan) const;
   void accumulate(const cairn::SE2& moved);

@@ -13,6 +13,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <numbers>
 #include <vector>
 
 #include <cairn/core/cholesky.hpp>
@@ -120,11 +121,14 @@ private:
   /// kernel bridges; the mean itself where the motion is no wider.
   [[nodiscard]] cairn::SE2 best_start(const OccupancyMap& map, const cairn::Gaussian<cairn::SE2>& motion,
                                       const OccupancyMap::Observation& z) const {
-    constexpr double reach = 0.15, turn = 0.08;  // [m], [rad] between neighbours
-    const auto count = [](double sigma, double spacing) { return static_cast<int>(2 * sigma / spacing); };
-    const int nx = count(std::sqrt(motion.covariance(0, 0)), reach);
-    const int ny = count(std::sqrt(motion.covariance(1, 1)), reach);
-    const int na = count(std::sqrt(motion.covariance(2, 2)), turn);
+    constexpr double reach = 0.15, turn = 0.08;               // [m], [rad] between neighbours
+    constexpr double farthest = 3, round = std::numbers::pi;  // [m], [rad]: beyond, odometry says nothing
+    const auto count = [](double variance, double most, double spacing) {
+      return static_cast<int>(std::min(2 * std::sqrt(variance), most) / spacing);
+    };
+    const int nx = count(motion.covariance(0, 0), farthest, reach);
+    const int ny = count(motion.covariance(1, 1), farthest, reach);
+    const int na = count(motion.covariance(2, 2), round, turn);
     if (nx + ny + na == 0) return motion.mean;
     cairn::EndPointModel wide = map.model;
     wide.sigma *= widths.empty() ? 1 : widths.front();

@@ -153,6 +153,17 @@ TEST_SUITE("fastslam/slam") {
     put_robot(folder, "0 1 0\n2 1 0\n", "1.5 99 2 0\n");
     CHECK(complaint(robot).find("saw no landmark") != std::string::npos);
     CHECK(complaint([&] { return read_mrclam(folder / "none", 1); }) != "");
+    put_robot(folder, "0 1 0\n2 1 0\n", "1.5 1e300 2 0\n");
+    CHECK(complaint(robot).find("Robot1_Measurement.dat:1: expected a whole number") != std::string::npos);
+    put_robot(folder, "0 1 0\n2 1 0\n", "1.5 6.5 2 0\n");
+    CHECK(complaint(robot).find("column 2") != std::string::npos);
+    put_robot(folder, "0 1 0\n2 1 0\n", "1.5 63 -2 0\n");
+    CHECK(complaint(robot).find("not negative") != std::string::npos);
+    put_robot(folder, "0 1 0\n2 1 0\n", "1.5 63 2 0\n");
+    folder.put("Barcodes.dat", "-6 63\n");
+    CHECK(complaint(robot).find("Barcodes.dat:1") != std::string::npos);
+    put_robot(folder, "0 1e300 1e300\n1e300 1 0\n", "1.5 63 2 0\n");
+    CHECK(complaint(robot).find("Robot1_Odometry.dat: the motion until 1.5 s") != std::string::npos);
 
     const auto graph = [&](const std::string& text) {
       folder.put("graph.txt", text);
@@ -168,6 +179,8 @@ TEST_SUITE("fastslam/slam") {
     CHECK(graph(move + "LANDMARK 1 4294967295 3 4 0.4 0 0.4\n").find("2^24") != std::string::npos);
     CHECK(graph(move + "LANDMARK 1 2 3 4 0.4 0.1 0.4\n").find("covariance") != std::string::npos);
     CHECK(graph("ODOMETRY 0 1 1 0 0 0.1 0 0 0 0 0.1\n").find("every direction") != std::string::npos);
+    CHECK(graph("ODOMETRY 0 1 1e308 0 0 0.1 0 0 0.1 0 0.1\nODOMETRY 1 2 1e308 0 0 0.1 0 0 0.1 0 0.1\n")
+              .find(":2: expected motions that remain finite") != std::string::npos);
     CHECK(graph("VERTEX 0\n").find("ODOMETRY or LANDMARK") != std::string::npos);
 
     const auto map = [&](const std::string& text) {

@@ -2,18 +2,22 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
+#include <cairn/io/binary_file.hpp>
 #include <cairn/io/file.hpp>
 
 #include "floor_plan.hpp"
 #include "mapper.hpp"
 #include "outputs.hpp"
 #include "support/folder.hpp"
+#include "support/random.hpp"
 
 namespace map_file_test {
 namespace {
@@ -103,6 +107,37 @@ TEST_SUITE("grid_slam/map_file") {
     }
     const SE2 expected = mapper.trajectory(true)[300].pose;
     CHECK((localiser.trajectory(true).front().pose.translation() - expected.translation()).norm() < 0.05);
+  }
+
+  TEST_CASE("map_file: made-up numbers under a right checksum are refused in words, or are a map") {
+    const cairn_test::Folder folder;
+    const Drive drive = simulated_drive({.seed = 2});
+    Mapper mapper({.particles = 2});
+    for (std::size_t i = 0; i < 60; ++i) mapper.add(drive.log.scans[i]);
+    mapper.save(folder / "map");
+    const std::string numbers = cairn::read_file(folder / "map").substr(32);
+    const std::uint64_t seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const double values[] = {NAN, INFINITY, 1e300, -1e300, -1, 1e-300, 0.5};
+    int refused = 0;
+    for (int round = 0; round < 150; ++round) {
+      cairn::BinaryWriter changed;
+      const std::size_t at = random.below(numbers.size() - 8) / 8 * 8 + (round % 2 == 0 ? 0 : 4);
+      char bytes[8];
+      std::memcpy(bytes, &values[round % 7], 8);
+      for (std::size_t i = 0; i < numbers.size(); ++i) changed.put(i - at < 8 ? bytes[i - at] : numbers[i]);
+      folder.put("changed", changed.file("cairngrd", 1));
+      const std::string words = cairn_test::message_of([&] {
+        Mapper loaded = Mapper::loaded(folder / "changed");
+        loaded.save(folder / "again");
+        CHECK(Mapper::loaded(folder / "again").trajectory(true).size() == loaded.scans().size());
+      });
+      if (words.empty()) continue;
+      ++refused;
+      CHECK(words.find("changed: ") != std::string::npos);
+    }
+    CHECK(refused > 10);
   }
 
   TEST_CASE("map_file: a scan that no place explains is refused in words") {

@@ -76,7 +76,8 @@ public:
   [[nodiscard]] bool empty() const noexcept { return empty_; }
 
   /// Takes in the end points of a scan made at `pose`: a hit in each cell with a point, free what lies
-  /// between the scanner and the points. Throws Error where the map would become too wide.
+  /// between the scanner and the points. Throws Error where the map would become too wide, or where one scan
+  /// spans more than 2^28 cells.
   void insert(const SE2& pose, const std::vector<ScanPoint>& points) {
     std::vector<CellAddress> changed;
     take_in(pose, points, changed);
@@ -153,6 +154,9 @@ private:
       first_ = tile_of(low);
       columns_ = tile_of(high).column - first_.column + 1;
       rows_ = tile_of(high).row - first_.row + 1;
+      constexpr std::int64_t most = 1 << 18;  // 16384 cells in square, 268 MB
+      if (std::int64_t{columns_} * rows_ > most)
+        raise("OccupancyGrid: expected a scan over at most 2^28 cells: farther beams, or larger cells?");
       marks_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_) * tile_cells);
     }
 

@@ -1,0 +1,37 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+// Saved maps of stereo_slam, the file's head and checksum made to fit: what is loaded is saved as the same
+// bytes.
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <string>
+
+#include <cairn/core/check.hpp>
+#include <cairn/io/binary_file.hpp>
+#include <cairn/io/file.hpp>
+
+#include "fuzz/scratch.hpp"
+#include "saved_map.hpp"
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  static const cairn_fuzz::Scratch scratch;
+  cairn::BinaryWriter numbers;
+  for (std::size_t i = 0; i < size; ++i) numbers.put(data[i]);
+  const auto path = scratch.put("map", numbers.file("cairnmap", 1));
+  try {
+    const stereo_slam::SavedMap saved = stereo_slam::load_map(path);
+    cairn_fuzz::expect(saved.landmarks.size() == saved.map.landmark_count(), "every landmark is described");
+    for (const stereo_slam::Landmark& landmark : saved.landmarks)
+      for (const float number : landmark.descriptor)
+        cairn_fuzz::expect(std::isfinite(number), "descriptors are finite");
+    stereo_slam::save_map(scratch / "again", saved);
+    const std::string once = cairn::read_file(scratch / "again");
+    stereo_slam::save_map(scratch / "twice", stereo_slam::load_map(scratch / "again"));
+    cairn_fuzz::expect(once == cairn::read_file(scratch / "twice"), "a map that was loaded can be saved");
+  } catch (const cairn::Error&) {
+    return 0;
+  }
+  return 0;
+}
