@@ -59,6 +59,31 @@ setTimeout(async () => {
 }, 1500);
 </script>)";
 
+/// axe-core's verdict on the page, or nothing where npm did not bring it.
+std::string judge() {
+  const fs::path axe = CAIRN_AXE;
+  if (!fs::exists(axe)) return {};
+  return "<script>" + cairn::read_file(axe) + R"(</script><script>
+setTimeout(async () => {
+  const { violations } = await axe.run(document, {});
+  const words = violations.map((one) => `${one.id}: ${one.nodes[0].html.slice(0, 100)}`).join('; ');
+  document.documentElement.dataset.axe = `${violations.length} violations ${words}`;
+}, 2500);
+</script>)";
+}
+
+void check_accessible(const OpenedPage& opened) {
+  if (!fs::exists(CAIRN_AXE)) {
+    MESSAGE("skipped: no axe-core (npm)");
+    return;
+  }
+  const std::size_t at = opened.document.find("data-axe=\"");
+  REQUIRE(at != std::string::npos);
+  const std::string verdict = opened.document.substr(at, 300);
+  CAPTURE(verdict);
+  CHECK(verdict.find("data-axe=\"0 violations") == 0);
+}
+
 bool can_open() {
   if (!example::has_report_page())
     MESSAGE("skipped: built without the page (npm)");
@@ -90,13 +115,14 @@ void check_opens(const std::string& lesson) {
   REQUIRE(outcome.code == 0);
   const fs::path page = folder / "out" / "index.html";
   REQUIRE(cairn_test::keep_picture(folder, page, lesson, 2000));
-  cairn::write_file_atomically(page, cairn::read_file(page) + mover);
+  cairn::write_file_atomically(page, cairn::read_file(page) + mover + judge());
   const OpenedPage opened = cairn_test::open_page(folder, page);
   CHECK(opened.console == "");
   CHECK(opened.has("data-panels="));
   CHECK(opened.has("class=\"figure good\""));
   CHECK_FALSE(opened.has("class=\"empty\""));
   check_sliders_move(opened);
+  check_accessible(opened);
 }
 
 }  // namespace
@@ -108,7 +134,8 @@ TEST_CASE("course: the page of every lesson opens without a word on the console,
   for (const std::string& lesson : lessons()) check_opens(lesson);
 }
 
-TEST_CASE("report page: films, heat maps, bands, dots and areas are drawn, gaps and all") {
+TEST_CASE(
+    "report page: films, heat maps, bands, dots and areas are drawn, gaps and all, and axe finds nothing") {
   if (!can_open()) return;
   const double gap = std::numeric_limits<double>::quiet_NaN();
   example::Report report("panels", "");
@@ -126,15 +153,20 @@ TEST_CASE("report page: films, heat maps, bands, dots and areas are drawn, gaps 
   film.frames.push_back({2, "nothing here", {}});
   report.add(film);
   report.add(example::Cloud{.title = "cloud", .points = {{0, 0, 0}, {1, 1, 1}}});
+  report.add(example::Table{.title = "table", .columns = {"name", "value"}, .rows = {{"one", "1"}}});
+  report.figure({"figure", "1", "m", "a hint", example::KeyFigure::Verdict::good});
+  report.note("a note");
   const cairn_test::Folder folder;
-  cairn::write_file_atomically(folder / "page.html", report.html().value() + mover + saver);
+  cairn::write_file_atomically(folder / "page.html", report.html().value() + mover + saver + judge());
   const OpenedPage opened = cairn_test::open_page(folder, folder / "page.html");
   CHECK(opened.console == "");
-  CHECK(opened.has("data-panels=\"5\""));
+  CHECK(opened.has("data-panels=\"6\""));
   CHECK(opened.has("data-saved=\"5 of 5 saved\""));
   CHECK(opened.count("class=\"heat\"") == 2);
   CHECK(opened.count("type=\"range\"") == 1);
+  CHECK(opened.count("href=\"#figure-") == 6);
   check_sliders_move(opened);
+  check_accessible(opened);
 }
 
 TEST_SUITE_END();

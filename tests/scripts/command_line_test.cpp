@@ -20,9 +20,9 @@ Outcome run(const std::string& command, const std::string& standard_output = "")
   return cairn_test::run_program("CAIRN_SKIP_INSTALL=1 \"" CAIRN_SCRIPTS "\"/" + command, standard_output);
 }
 
-const std::vector<std::string> scripts{"benchmark",  "check_headers", "check_layers",
-                                       "check_tidy", "course",        "include_cost",
-                                       "install",    "scoreboard",    "test"};
+const std::vector<std::string> scripts{"benchmark",  "docs",   "check_headers", "check_layers",
+                                       "check_tidy", "course", "include_cost",  "install",
+                                       "scoreboard", "test"};
 
 }  // namespace
 

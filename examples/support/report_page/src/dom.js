@@ -49,9 +49,33 @@ export function onResize(node, change) {
   })).observe(node);
 }
 
-/** A legend entry that switches something on and off. */
-export function switchable(name, ink, toggle, shape = '') {
+/** Lines are told apart by their dashes too: not everybody sees the colours. */
+const inkDashes = { measurement: [3, 4], wrong: [11, 4, 3, 4], grey: [5, 3], teal: [13, 5], violet: [7, 3, 2, 3, 2, 3] };
+
+/** The dashes of a line of this ink among `count` lines. */
+export function dashesOf(curve, count) {
+  if (curve.dashed) return [7, 6];
+  return count > 1 ? (inkDashes[curve.ink] ?? []) : [];
+}
+
+const svgSpace = 'http://www.w3.org/2000/svg';
+
+/** A piece of a line, as legends show it. */
+function sample(dashes) {
+  const svg = document.createElementNS(svgSpace, 'svg');
+  const line = document.createElementNS(svgSpace, 'line');
+  for (const [name, value] of Object.entries({ width: 30, height: 8, 'aria-hidden': 'true' })) svg.setAttribute(name, value);
+  for (const [name, value] of Object.entries({ x1: 0, x2: 30, y1: 4, y2: 4, 'stroke-width': 3, 'stroke-dasharray': dashes.join(' ') }))
+    line.setAttribute(name, value);
+  line.style.stroke = 'var(--ink)';
+  svg.append(line);
+  return svg;
+}
+
+/** A legend entry that switches something on and off. `shape`: a class of page.css, or the dashes of a line. */
+export function switchable(name, ink, toggle, shape = []) {
   const box = element('input', { type: 'checkbox', checked: true });
   box.addEventListener('change', () => toggle(box.checked));
-  return element('label', { className: 'key', style: { '--ink': `var(--${ink})` } }, box, element('i', { className: shape }), name);
+  const sign = Array.isArray(shape) ? sample(shape) : element('i', { className: shape });
+  return element('label', { className: 'key', style: { '--ink': `var(--${ink})` } }, box, sign, name);
 }

@@ -19,7 +19,7 @@ const kinds = {
 };
 
 function head(data) {
-  const button = element('button', { type: 'button', ariaLabel: 'Switch between light and dark' }, 'light / dark');
+  const button = element('button', { type: 'button', title: 'Switch between light and dark' }, 'light / dark');
   button.addEventListener('click', toggleTheme);
   return element('header', {}, element('div', {}, element('h1', {}, data.title), element('p', {}, data.subtitle)), button);
 }
@@ -32,7 +32,7 @@ function figures(data) {
     element('dt', {}, figure.label),
     element('dd', {}, figure.value, figure.unit ? element('small', {}, figure.unit) : null,
       verdicts[figure.verdict] ? element('b', {}, verdicts[figure.verdict]) : null),
-    figure.hint ? element('span', { className: 'hint' }, figure.hint) : null));
+    figure.hint ? element('dd', { className: 'hint' }, figure.hint) : null));
   return element('dl', { className: 'figures' }, ...cells);
 }
 
@@ -41,10 +41,18 @@ function notes(data) {
   return element('ul', { className: 'notes' }, ...data.notes.map((note) => element('li', {}, note)));
 }
 
-function show(panel, grid) {
+/** What is on the page, for one that is longer than a screen. */
+function contents(data) {
+  if (data.panels.length < 3) return null;
+  const links = data.panels.map((panel, i) => element('li', {}, element('a', { href: `#figure-${i + 1}` }, panel.title)));
+  return element('nav', { className: 'contents', ariaLabel: 'Contents' }, element('ol', {}, ...links));
+}
+
+function show(panel, number, grid) {
   const body = element('div', { className: 'body' });
-  const card = element('section', { className: panel.wide ? 'panel wide' : 'panel' }, element('h2', {}, panel.title),
-    panel.caption ? element('p', {}, panel.caption) : null, body);
+  const card = element('section', { className: panel.wide ? 'panel wide' : 'panel', id: `figure-${number}` },
+    element('h2', { id: `title-${number}` }, panel.title), panel.caption ? element('p', {}, panel.caption) : null, body);
+  card.setAttribute('aria-labelledby', `title-${number}`);
   grid.append(card);
   const kind = kinds[panel.kind];
   if (kind.empty(panel)) {
@@ -52,6 +60,10 @@ function show(panel, grid) {
     return;
   }
   kind.draw(panel, body);
+  for (const canvas of body.querySelectorAll('canvas:not([role])')) {
+    canvas.setAttribute('role', 'img');
+    canvas.setAttribute('aria-label', panel.title);
+  }
   const save = saveButton(panel, body);
   if (save) card.prepend(save);
 }
@@ -60,7 +72,13 @@ startTheme();
 const data = JSON.parse(document.getElementById('data').textContent);
 const page = document.getElementById('page');
 const grid = element('div', { className: 'panels' });
-page.append(...[head(data), figures(data), notes(data), grid].filter((part) => part !== null));
-for (const panel of data.panels) show(panel, grid);
+page.append(...[head(data), figures(data), notes(data), contents(data), grid].filter((part) => part !== null));
+data.panels.forEach((panel, i) => show(panel, i + 1, grid));
+// ?figure=2 shows the second figure and nothing else: for pictures of it (docs/site).
+const only = document.getElementById(`figure-${new URLSearchParams(location.search).get('figure')}`);
+if (only) {
+  document.documentElement.dataset.only = '';
+  only.classList.add('only');
+}
 // A test reads this: every panel was drawn and nothing was thrown on the way.
 document.documentElement.dataset.panels = data.panels.length;

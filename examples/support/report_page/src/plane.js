@@ -1,6 +1,6 @@
 // Curves in a plane, still or along a slider. uPlot draws the axes; its own paths want a common axis, so the curves are ours.
 import uPlot from 'uplot';
-import { colour, element, onResize, readable, switchable } from './dom.js';
+import { colour, dashesOf, element, onResize, readable, switchable } from './dom.js';
 import { axisOptions, horizontal } from './plots.js';
 import { onTheme } from './theme.js';
 
@@ -40,14 +40,14 @@ function trace(plot, curve) {
   });
 }
 
-function drawCurve(plot, curve) {
+function drawCurve(plot, curve, count) {
   const { ctx } = plot;
   const pixel = devicePixelRatio;
   ctx.lineJoin = 'round';
   ctx.lineCap = 'round';
   // The truth lies below the estimate and still shows where the two agree.
   ctx.lineWidth = (curve.dots ? 5 : curve.ink === 'truth' ? 4 : 1.8) * pixel;
-  ctx.setLineDash(curve.dashed ? [7 * pixel, 6 * pixel] : []);
+  ctx.setLineDash(curve.dots || curve.filled ? [] : dashesOf(curve, count).map((length) => length * pixel));
   ctx.strokeStyle = colour(curve.ink);
   ctx.fillStyle = colour(curve.ink);
   trace(plot, curve);
@@ -60,14 +60,14 @@ function drawCurve(plot, curve) {
 }
 
 /** Draws the curves of one name that are there now. */
-function drawNamed(plot, curves) {
+function drawNamed(plot, curves, count) {
   plot.ctx.save();
   plot.ctx.beginPath();
   plot.ctx.rect(plot.bbox.left, plot.bbox.top, plot.bbox.width, plot.bbox.height);
   plot.ctx.clip();
   for (const curve of curves) {
     plot.ctx.globalAlpha = 1;
-    drawCurve(plot, curve);
+    drawCurve(plot, curve, count);
   }
   plot.ctx.restore();
   return null;
@@ -91,10 +91,11 @@ function fit(plot, bounds, equal) {
 /** A plot of all these curves with a legend; show(curves) draws those from then on, in the same frame. */
 function view(panel, all, body) {
   const names = [...new Map(all.map((curve) => [curve.name, curve])).values()];
+  const lines = names.filter((curve) => !curve.dots && !curve.filled).length;
   const bounds = frameOf(all);
   const height = panel.wide ? 520 : 420;
   let shown = all;
-  const paths = (plot, index) => drawNamed(plot, shown.filter((curve) => curve.name === names[index - 1].name));
+  const paths = (plot, index) => drawNamed(plot, shown.filter((curve) => curve.name === names[index - 1].name), lines);
   const options = {
     mode: 2,
     width: 600,
@@ -115,7 +116,7 @@ function view(panel, all, body) {
     fit(plot, bounds, panel.equal_scale);
   });
   onTheme(() => plot.redraw(false));
-  const shape = (curve) => ['dots', 'dashed', 'filled'].find((kind) => curve[kind]) ?? '';
+  const shape = (curve) => ['dots', 'filled'].find((kind) => curve[kind]) ?? dashesOf(curve, lines);
   body.append(
     element('div', { className: 'bar' }, ...names.map((curve, i) =>
       switchable(curve.name, curve.ink, (show) => plot.setSeries(i + 1, { show }), shape(curve)))),

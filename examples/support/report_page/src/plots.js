@@ -1,6 +1,6 @@
 // Plots with uPlot of curves over a common axis, and what its axes look like.
 import uPlot from 'uplot';
-import { colour, element, labelled, onResize, readable } from './dom.js';
+import { colour, dashesOf, element, labelled, onResize, readable } from './dom.js';
 import { onTheme } from './theme.js';
 
 const pairing = uPlot.sync('common axis');
@@ -37,8 +37,19 @@ function logarithmicTicks(_, __, low, high) {
   return ticks;
 }
 
+/** Those of the ticks that have room for their numbers, which on a phone are powers of ten, or some of them. */
+function roomyTicks(plot, ticks) {
+  const decade = Math.abs(plot.valToPos(10, 'x') - plot.valToPos(1, 'x'));
+  if (decade >= 150) return ticks;
+  const each = Math.ceil(52 / decade);
+  return ticks.map((tick) => {
+    const power = Math.round(Math.log10(tick));
+    return Math.abs(Math.log10(tick) - power) < 1e-9 && power % each === 0 ? tick : null;
+  });
+}
+
 function logarithmic(axis) {
-  return { ...horizontal(axis), splits: logarithmicTicks, filter: (_, ticks) => ticks };
+  return { ...horizontal(axis), splits: logarithmicTicks, filter: roomyTicks };
 }
 
 /** Positive values only, for a logarithmic axis. */
@@ -69,13 +80,15 @@ function seriesOf(panel) {
 }
 
 /** The border of a curve's sign in the legend. */
-function dashOf(curve) {
-  if (curve?.dots) return 'dotted';
-  return curve?.dashed ? 'dashed' : 'solid';
+function dashOf(curve, count) {
+  if (!curve || curve.edge) return 'solid';
+  if (curve.dots) return 'dotted';
+  return dashesOf(curve, count).length > 0 ? 'dashed' : 'solid';
 }
 
 export function lines(panel, body) {
   const series = seriesOf(panel);
+  const count = series.filter((curve) => !curve.edge && !curve.dots).length;
   const values = series.map((curve) => (panel.logarithmic ? positive(curve.values) : curve.values));
   const options = {
     width: 600,
@@ -86,15 +99,16 @@ export function lines(panel, body) {
     },
     axes: [panel.logarithmic_x ? logarithmic(panel.x) : horizontal(panel.x), axisOptions(panel.y)],
     cursor: { sync: { key: pairing.key, setSeries: false }, focus: { prox: 30 }, points: { size: 6 } },
-    legend: { markers: { dash: (_, index) => (dashOf(series[index - 1])) } },
+    legend: { markers: { dash: (_, index) => dashOf(series[index - 1], count) } },
     bands: panel.bands.map((band, i) => ({ series: [2 * i + 1, 2 * i + 2], fill: () => tint(band.ink, 16) })),
     series: [
       { label: labelled(panel.x), value: (_, value) => readable(value) },
       ...series.map((curve) => ({
         label: curve.name,
         stroke: () => (curve.edge ? tint(curve.ink, 45) : colour(curve.ink)),
-        width: curve.edge ? 1 : 1.6,
-        dash: curve.dashed ? [6, 5] : undefined,
+        // The truth lies below the estimate and still shows where the two agree.
+        width: curve.edge ? 1 : curve.ink === 'truth' && count > 1 ? 3.5 : 1.8,
+        dash: curve.edge ? undefined : dashesOf(curve, count),
         paths: curve.dots ? () => null : undefined,
         points: curve.dots
           ? { show: true, size: panel.x_values.length > 150 ? 4 : 7, fill: () => colour(curve.ink), width: 0 }

@@ -19,14 +19,38 @@ function composed(canvas, title) {
   return sheet;
 }
 
-/** A button that saves what the panel's canvas shows; null where it has none. */
+/** The photograph with the marks that are shown over it, at its own size. */
+async function photograph(picture) {
+  const image = picture.querySelector('img');
+  const marks = picture.querySelector('svg').cloneNode(true);
+  // Away from the page the marks have neither its colours nor the rule by which their width is that of the screen.
+  const shown = picture.querySelectorAll('g');
+  marks.querySelectorAll('g').forEach((group, i) => {
+    group.setAttribute('stroke', getComputedStyle(shown[i].firstChild).stroke);
+    group.setAttribute('fill', 'none');
+    group.setAttribute('stroke-linecap', 'round');
+  });
+  marks.setAttribute('width', image.naturalWidth);
+  marks.setAttribute('height', image.naturalHeight);
+  const drawn = new Image();
+  drawn.src = `data:image/svg+xml,${encodeURIComponent(new XMLSerializer().serializeToString(marks))}`;
+  await drawn.decode();
+  const canvas = element('canvas', { width: image.naturalWidth, height: image.naturalHeight });
+  const ctx = canvas.getContext('2d');
+  ctx.drawImage(image, 0, 0);
+  ctx.drawImage(drawn, 0, 0);
+  return canvas;
+}
+
+/** A button that saves what the panel's canvas or picture shows; null where it has none. */
 export function saveButton(panel, body) {
   const canvas = body.querySelector('canvas');
-  if (!canvas) return null;
+  const picture = body.querySelector('.picture');
+  if (!canvas && !picture) return null;
   const button = element('button', { type: 'button', className: 'save', title: `Save "${panel.title}" as a PNG file` }, 'PNG');
-  button.addEventListener('click', () => {
-    canvas.dispatchEvent(new Event('beforesave')); // a canvas of WebGL is empty until it is drawn again
-    composed(canvas, panel.title).toBlob((png) => {
+  button.addEventListener('click', async () => {
+    canvas?.dispatchEvent(new Event('beforesave')); // a canvas of WebGL is empty until it is drawn again
+    composed(canvas ?? (await photograph(picture)), panel.title).toBlob((png) => {
       const link = element('a', { href: URL.createObjectURL(png), download: `${panel.title.replace(/[^\w.-]+/g, '_')}.png` });
       link.click();
       setTimeout(() => URL.revokeObjectURL(link.href), 1000);
