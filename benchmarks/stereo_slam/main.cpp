@@ -3,8 +3,10 @@
 //
 /// @file
 /// How true and how accurate stereo SLAM is: errors and NEES on the rendered arena over several seeds, drift
-/// on recorded drives, time. CAIRN_ARENA_SEEDS says how many seeds (3; a script of a new seed is rendered
-/// first, which takes minutes).
+/// on recorded drives, time, and what a map costs that lasts. CAIRN_ARENA_SEEDS says how many seeds (3; a
+/// script of a new seed is rendered first, which takes minutes), CAIRN_VIDEO_MINUTES how long the arena is
+/// looped (6; an hour is 60, and takes a quarter of one), CAIRN_STEREO_ROWS which rows are wanted, by
+/// commas: arena,drives,relocalisation,rate,stores,video (all).
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -26,6 +28,7 @@
 #include "arena_dataset.hpp"
 #include "arena_script.hpp"
 #include "dataset.hpp"
+#include "lasting.hpp"
 #include "pipeline.hpp"
 #include "saved_map.hpp"
 #include "summary.hpp"
@@ -76,12 +79,23 @@ std::uint64_t seeds() {
   return text != nullptr ? std::max(1ULL, std::strtoull(text, nullptr, 10)) : 3;
 }
 
+std::size_t video_minutes() {
+  const char* text = std::getenv("CAIRN_VIDEO_MINUTES");
+  return text != nullptr ? std::max(1UL, std::strtoul(text, nullptr, 10)) : 6;
+}
+
+bool wanted(const std::string& rows) {
+  const char* text = std::getenv("CAIRN_STEREO_ROWS");
+  return text == nullptr || ("," + std::string(text) + ",").find("," + rows + ",") != std::string::npos;
+}
+
 /// Largest errors, NEES of every run, the second lap.
 void add_arena_rows(Scoreboard& board) {
   double position = 0, heading = 0, revisit = 0, revisit_heading = 0;
   std::size_t lost = 0;
   std::vector<double> nees;
-  std::string each;
+  std::string each, loops;
+  double met_again = 0, before = 0;
   for (const std::string script : {"loop", "turn", "spiral"}) {
     each += (each.empty() ? "" : "; ") + script;
     for (std::uint64_t seed = 1; seed <= seeds(); ++seed) {
@@ -89,6 +103,11 @@ void add_arena_rows(Scoreboard& board) {
       const stereo_slam::TruthErrors& errors = one.summary.errors.value();
       lost += one.summary.frames_lost;
       nees.push_back(errors.consistency.value().nees_mean);
+      loops += (loops.empty() ? "" : ", ") + script + ' ' + std::to_string(one.summary.loops_closed);
+      for (const stereo_slam::LoopEffect& loop : one.summary.loops) {
+        met_again = std::max(met_again, loop.after.value().position);
+        before = std::max(before, loop.before.value().position);
+      }
       each += ' ' + cairn::shortest(std::round(10 * nees.back()) / 10);
       if (script == "spiral") continue;
       position = std::max(position, errors.largest.position);
@@ -149,6 +168,11 @@ void add_arena_rows(Scoreboard& board) {
              .unit = "deg",
              .must = 0.05,
              .note = over});
+  board.add(
+      {.name = "places met again: largest position error with the landmarks that came back",
+       .measured = met_again,
+       .unit = "m",
+       .note = "without them " + cairn::shortest(std::round(1e4 * before) / 1e4) + " m; times: " + loops});
   board.add({.name = "arena: frames lost",
              .measured = static_cast<double>(lost),
              .unit = "",
@@ -305,12 +329,16 @@ void add_rate_row(Scoreboard& board) {
 int main(int argc, char** argv) {
   if (const auto code = cairn_bench::answer(argc, argv, "scoreboard_stereo_slam")) return *code;
   Scoreboard board("stereo_slam");
-  add_arena_rows(board);
+  if (wanted("video"))
+    stereo_slam_bench::add_hour_rows(board, 600 * video_minutes());  // its memory is ours: first
+  if (wanted("arena")) add_arena_rows(board);
   for (const auto calibrate : {stereo_slam::Calibration::automatic, stereo_slam::Calibration::off}) {
+    if (!wanted("drives")) break;
     add_odometry_rows(board, calibrate);
     add_raw_rows(board, calibrate);
   }
-  add_relocalisation_rows(board);
-  add_rate_row(board);
+  if (wanted("relocalisation")) add_relocalisation_rows(board);
+  if (wanted("rate")) add_rate_row(board);
+  if (wanted("stores")) stereo_slam_bench::add_store_rows(board);
   return board.finish();
 }

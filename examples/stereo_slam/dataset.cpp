@@ -6,6 +6,7 @@
 #include <map>
 #include <string>
 #include <system_error>
+#include <utility>
 
 #include <cairn/core/check.hpp>
 #include <cairn/io/file.hpp>
@@ -15,6 +16,7 @@
 #include "arena_dataset.hpp"
 #include "recording.hpp"
 #include "support/image_io.hpp"
+#include "support/rig_file.hpp"
 
 namespace stereo_slam {
 namespace {
@@ -35,18 +37,30 @@ std::string projection(const char* label, const cairn::PinholeCamera& camera, do
 }  // namespace
 
 std::unique_ptr<Dataset> open_dataset(const DatasetOptions& options) {
-  if (options.kind == "arena") return open_arena(options.arena, options.frames, options.threads);
+  if (options.kind == "arena") {
+    if (!options.camera.empty())
+      cairn::raise("the arena is rendered with a rig of its own; expected a recorded data set with --camera");
+    return open_arena(options.arena, options.frames, options.threads);
+  }
+  const auto with_rig = [&](Recording recording) {
+    if (!options.camera.empty()) recording.rig = example::read_rig(options.camera).rig;
+    return play(std::move(recording), options.frames);
+  };
+  if (options.kind == "images") {
+    if (options.camera.empty()) cairn::raise("images need a rig; expected one with --camera (rig.yaml)");
+    return with_rig(read_images({options.left, options.right, options.rate}));
+  }
   using Reader = Recording (*)(const std::filesystem::path&);
   const std::map<std::string, Reader> readers{
       {"kitti_odometry", read_kitti_odometry}, {"kitti_raw", read_kitti_raw}, {"euroc", read_euroc}};
   const auto reader = readers.find(options.kind);
   if (reader == readers.end())
     cairn::raise("there is no kind of data set '" + options.kind +
-                 "'; expected arena, kitti_odometry, kitti_raw or euroc");
+                 "'; expected arena, kitti_odometry, kitti_raw, euroc or images");
   if (options.folder.empty()) cairn::raise("the data set " + options.kind + " needs a folder; expected one");
   std::filesystem::path folder = options.folder.lexically_normal();
   if (!folder.has_filename()) folder = folder.parent_path();  // "drive/" is "drive"
-  return play(reader->second(folder), options.frames);
+  return with_rig(reader->second(folder));
 }
 
 void write_kitti_sequence(const Dataset& dataset, const std::filesystem::path& folder) {

@@ -29,6 +29,7 @@ public:
   void sighted(LandmarkId id) override { store_.sighted(id); }
   void trust(LandmarkId id) override { store_.trust(id); }
   bool is_base(LandmarkId id) const override { return store_.is_base(id); }
+  void merge(LandmarkId kept, LandmarkId twin) override { store_.merge(kept, twin); }
   void erase(LandmarkId id) override { static_cast<void>(store_.erase(id)); }
   std::vector<LandmarkId> advance() override { return store_.advance().expired; }
 

@@ -53,6 +53,8 @@ public:
   /// A landmark of an earlier run: base from the next step on.
   virtual void trust(LandmarkId id) = 0;
   [[nodiscard]] virtual bool is_base(LandmarkId id) const = 0;
+  /// `twin` is the same as `kept`: it goes, and its sightings are kept's.
+  virtual void merge(LandmarkId kept, LandmarkId twin) = 0;
   /// Removes a landmark, where it is there.
   virtual void erase(LandmarkId id) = 0;
   /// Ends the step; returns the landmarks that ran out of time.

@@ -28,6 +28,7 @@ struct Landmark {
   int first_seen = 0;  ///< step
   int last_seen = 0;   ///< step
   int sightings = 1;
+  int expected = 1;  ///< frames in which it was seen or should have been
 };
 
 /// Landmarks in no particular but deterministic order, found by id in O(1).

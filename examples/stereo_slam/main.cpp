@@ -28,6 +28,7 @@
 #include "support/command_line.hpp"
 #include "support/interruption.hpp"
 #include "support/progress.hpp"
+#include "support/rig_file.hpp"
 #include "support/standard_output.hpp"
 
 namespace {
@@ -36,7 +37,7 @@ struct Arguments {
   stereo_slam::DatasetOptions dataset;
   stereo_slam::PipelineOptions pipeline;
   std::filesystem::path out = "stereo_slam_out";
-  std::filesystem::path dump, map, save_map;
+  std::filesystem::path dump, map, save_map, save_rig;
   std::string store = "multi";
   std::string features = "surf";
   std::string calibrate = "auto";
@@ -46,10 +47,28 @@ struct Arguments {
 void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& dataset) {
   app.add_option("--dataset", dataset,
                  "arena (rendered, needs nothing), or a recorded drive and its folder:\n"
-                 "kitti_odometry DIR, kitti_raw DIR (unrectified), euroc DIR")
+                 "kitti_odometry DIR, kitti_raw DIR (unrectified), euroc DIR; for other images see --left")
       ->expected(1, 2)
       ->type_name("KIND [DIR]")
       ->default_str("arena");
+  CLI::Option* const camera =
+      app.add_option("--camera", arguments.dataset.camera,
+                     "the stereo rig (rig.yaml, of cairn or of OpenCV): of --left and --right, or instead of "
+                     "the recording's own")
+          ->type_name("FILE");
+  CLI::Option* const left =
+      app.add_option("--left", arguments.dataset.left,
+                     "images of anybody's: the left ones as a pattern in quotes, 'drive/left/*.png'")
+          ->type_name("GLOB")
+          ->needs(camera)
+          ->excludes("--dataset");
+  app.add_option("--right", arguments.dataset.right, "the right ones; paired by the numbers in their names")
+      ->type_name("GLOB")
+      ->needs(left);
+  left->needs("--right");
+  app.add_option("--fps", arguments.dataset.rate, "their frames a second (default: the names are times)")
+      ->check(example::number_between(1e-3, 1e4))
+      ->needs(left);
   app.add_option("--out", arguments.out, "folder for the results")->type_name("DIR")->capture_default_str();
   app.add_option("--frames", arguments.dataset.frames, "stop after so many frames; 0 = all")
       ->check(example::whole_number(0))
@@ -92,6 +111,9 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
       ->capture_default_str();
   app.add_flag("!--no-cache", arguments.dataset.arena.cache, "arena: do not keep rendered images on disk");
   app.add_option("--save", arguments.save_map, "write the map for another run into FILE")->type_name("FILE");
+  app.add_option("--save-rig", arguments.save_rig,
+                 "write the rig as the run corrected it, with its standard deviations, for --camera")
+      ->type_name("FILE");
   CLI::Option* const map =
       app.add_option("--load", arguments.map, "begin in the map of an earlier run and go on with it")
           ->type_name("FILE");
@@ -189,7 +211,7 @@ int main(int argc, char** argv) {
   define(app, arguments, dataset);
   if (const std::optional<int> code = example::parse(app, "stereo_slam", argc, argv)) return *code;
   try {
-    arguments.dataset.kind = dataset.front();
+    arguments.dataset.kind = arguments.dataset.left.empty() ? dataset.front() : "images";
     if (dataset.size() > 1) arguments.dataset.folder = dataset[1];
     arguments.dataset.threads = arguments.pipeline.threads;
     arguments.dataset.arena.seed = arguments.pipeline.seed;
@@ -206,11 +228,20 @@ int main(int argc, char** argv) {
       stereo_slam::write_kitti_sequence(*frames, arguments.dump);
       return 0;
     }
+    example::CalibratedRig given{frames->rig(), {}, {}, {}, {}, {}};
+    if (!arguments.dataset.camera.empty()) {
+      given = example::read_rig(arguments.dataset.camera);
+      given.rig = frames->rig();  // which knows the size of its images
+      // What was calibrated well may have come loose since: never surer than by default.
+      arguments.pipeline.rig_sigma = std::max(arguments.pipeline.rig_sigma, given.angle_sigma().value_or(0));
+    }
     stereo_slam::prepare_output_folder(arguments.out);
     arguments.pipeline.sample_frame = frames->size() / 2;
     const Run done = run(*frames, arguments);
     if (done.record.ended_early) std::cerr << "stereo_slam: " << *done.record.ended_early << '\n';
     if (done.record.frames.empty()) return done.code;  // the results of an earlier run stay
+    if (!arguments.save_rig.empty())
+      example::write_rig(arguments.save_rig, stereo_slam::learned_rig(given, done.record));
     const std::optional<std::string> no_report = stereo_slam::write_outputs(done.record, arguments.out);
     print_summary(done.record);
     if (no_report) std::cout << "no report.html: " << *no_report << '\n';

@@ -12,6 +12,7 @@
 
 #include <Eigen/Eigenvalues>
 
+#include <cairn/geometry/rig_correction.hpp>
 #include <cairn/io/file.hpp>
 #include <cairn/io/ply.hpp>
 #include <cairn/io/text.hpp>
@@ -49,6 +50,22 @@ double largest_sigma(const cairn::Matrix<3, 3>& covariance) {
 
 void prepare_output_folder(const fs::path& folder) {
   results_in(folder).prepare();
+}
+
+example::CalibratedRig learned_rig(const example::CalibratedRig& given, const RunRecord& run) {
+  example::CalibratedRig learned = given;
+  learned.rig = run.rig;
+  const std::string of = run.dataset + ", " + std::to_string(run.frames.size()) + " frames";
+  learned.note = (run.calibration.on ? "learned from " : "as it was given: not corrected with ") + of;
+  if (!run.calibration.on) return learned;
+  const cairn::Vector<5>& sigmas = run.calibration.sigmas;
+  const cairn::Matrix<3, 2> turned = cairn::RigCorrection(given.rig).direction_jacobian();
+  learned.rotation_sigma = sigmas.head<3>();
+  learned.translation_sigma = cairn::Vector<3>::Zero();
+  for (int i = 0; i < 3; ++i)
+    (*learned.translation_sigma)(i) =
+        given.rig.baseline() * std::hypot(turned(i, 0) * sigmas(3), turned(i, 1) * sigmas(4));
+  return learned;
 }
 
 void write_covariances(const fs::path& path, const std::vector<FrameRecord>& frames) {

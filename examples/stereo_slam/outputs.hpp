@@ -12,6 +12,7 @@
 #include <string>
 
 #include "run_record.hpp"
+#include "support/rig_file.hpp"
 
 namespace stereo_slam {
 
@@ -24,6 +25,10 @@ void prepare_output_folder(const std::filesystem::path& folder);
 /// without the page for it (a report of an earlier run is then removed).
 [[nodiscard]] std::optional<std::string> write_outputs(const RunRecord& run,
                                                        const std::filesystem::path& folder);
+
+/// The rig as a run believes it to be, which began with `given`: the same cameras, and where the right one
+/// stands with the sigmas of the run's calibration. The length of the baseline stays as it was given.
+[[nodiscard]] example::CalibratedRig learned_rig(const example::CalibratedRig& given, const RunRecord& run);
 
 /// trajectory_covariance.csv: a head line, then a line a frame: its number, time [s], whether it was tracked
 /// (1 or 0), and the upper triangle of the covariance of its pose, row by row: the 21 numbers P_11 P_12 ...

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include <cairn/core/parallel.hpp>
+#include <cairn/core/statistics.hpp>
 #include <cairn/io/text.hpp>
 
 namespace stereo_slam {
@@ -67,6 +68,7 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options)
       calibration_(rig, options.calibration),
       store_(make_landmark_store(store_options(options))),
       map_(rig, map_options(options)),
+      loop_watch_(options.loops),
       pose_covariance_(cairn::Matrix<6>::Zero()) {
   record_.seed = options.seed;
   record_.threads = options.threads;
@@ -135,6 +137,10 @@ const FrameRecord& Pipeline::work_on(const StereoFrame& frame, double load_milli
   result.covariance = pose_covariance_;
   result.landmarks = landmarks_.size();
   result.keyframes = map_.keyframe_count();
+  if (!map_.empty()) {
+    result.reference = map_.keyframes_added() - 1;
+    result.T_world_reference = map_.keyframe_pose(result.reference).value_or(cairn::SE3());
+  }
   ++step_;
   return result;
 }
@@ -188,10 +194,14 @@ void Pipeline::follow(const StereoFrame& frame, FrameRecord& result) {
     keep_sample(frame, matches, located ? located->agreed : std::vector<Match>());
   if (!located) return lose(frame, matches.size());
   result.inliers = static_cast<int>(located->agreed.size());
+  note_loop(*located);
   move_to(*located, result);
   if (!options_.localise && wants_keyframe(located->agreed.size()))
     timed(result, Stage::update, [&] { make_keyframe(*located, frame, result); });
-  timed(result, Stage::store, [&] { close_step(); });
+  timed(result, Stage::store, [&] {
+    if (!options_.localise) age(*located);
+    close_step();
+  });
   if (options_.calibrate == Calibration::drifting)
     timed(result, Stage::update, [&] { calibrate(located->agreed); });
 }
@@ -280,17 +290,17 @@ void Pipeline::look_again(const cairn::StereoPose& pose, std::vector<Match>& mat
                         locals_[i].left_pixel,
                         locals_[i].right_pixel,
                         {left_->descriptor(locals_[i].point), left_->keypoints[locals_[i].point].laplacian}});
-  std::vector<ExpectedLandmark> expected;
+  expected_.clear();
   for (const LandmarkId id : map_.seen_with(in_play)) {
     if (std::ranges::binary_search(known, id)) continue;
     const Landmark& landmark = landmarks_[id];
     if (const auto position = map_.landmark(id))
-      expected.push_back({id, position->mean, {landmark.descriptor, landmark.sign}});
+      expected_.push_back({id, position->mean, {landmark.descriptor, landmark.sign}});
   }
   GuidedMatchingOptions guided = options_.second_look;
   guided.max_distance = options_.store.max_distance;
   for (const GuidedMatch& match :
-       match_guided(rig_, pose.T_world_camera, std::move(points), expected, guided))
+       match_guided(rig_, pose.T_world_camera, std::move(points), expected_, guided))
     matches.push_back({match.point, match.landmark});
 }
 
@@ -320,6 +330,7 @@ bool Pipeline::wants_keyframe(std::size_t agreed) {
 void Pipeline::make_keyframe(const Located& located, const StereoFrame& frame, FrameRecord& result) {
   if (!map_.add_keyframe(located.location, located.sightings)) return;
   if (map_.rig_correction()) look_through(map_.rig());
+  merge_twins(located);
   add_landmarks(located.agreed, frame);
   result.keyframe = true;
   best_share_ = 0;
@@ -369,11 +380,94 @@ void Pipeline::keep_bounded() {
     order.emplace_back(landmark.sightings, landmark.last_seen, landmark.id);
   const auto surplus = static_cast<std::ptrdiff_t>(landmarks_.size() - options_.max_landmarks);
   std::ranges::nth_element(order, order.begin() + surplus);
-  for (auto gone = order.begin(); gone != order.begin() + surplus; ++gone) {
-    const LandmarkId id = std::get<2>(*gone);
-    map_.forget(id);
-    store_->erase(id);
-    landmarks_.remove(id);
+  for (auto gone = order.begin(); gone != order.begin() + surplus; ++gone) forget(std::get<2>(*gone));
+}
+
+void Pipeline::forget(LandmarkId id) {
+  map_.forget(id);
+  store_->erase(id);
+  landmarks_.remove(id);
+}
+
+/// Whether a place is met again, and where the frame would be without it.
+void Pipeline::note_loop(const Located& located) {
+  std::vector<int> away;
+  std::vector<double> back;
+  std::vector<cairn::StereoSighting> others;
+  for (const Match& match : located.agreed) {
+    away.push_back(step_ - landmarks_[match.landmark].last_seen);
+    if (loop_watch_.comes_back(away.back()))
+      back.push_back(away.back());
+    else
+      others.push_back(sighting(match.local, match.landmark));
+  }
+  if (!loop_watch_.observe(step_, away) || lost_) return;
+  const cairn::MapLocation before = map_.locate(located.location.T_world_camera, others);
+  LoopClosure loop{record_.frames.size() - 1, back.size(), 0, std::nullopt};
+  loop.away = static_cast<int>(cairn::median(std::move(back)));
+  if (before.good()) loop.T_world_before = before.T_world_camera;
+  record_.loops.push_back(loop);
+}
+
+/// Landmarks that are hardly ever found where they must be go: what they were is no more, or never was.
+void Pipeline::age(const Located& located) {
+  std::vector<LandmarkId> seen;
+  for (const Match& match : located.agreed) {
+    seen.push_back(match.landmark);
+    if (map_.contains(match.landmark)) ++landmarks_[match.landmark].expected;
+  }
+  std::ranges::sort(seen);
+  const cairn::SE3 T_camera_world = T_world_camera_.inverse();
+  for (const ExpectedLandmark& one : expected_) {
+    if (!map_.contains(one.id) || std::ranges::binary_search(seen, one.id)) continue;
+    const auto pixels = rig_.project(T_camera_world * one.position);
+    const double margin = options_.second_look.radius;
+    if (!pixels || !rig_.left.contains(pixels->head<2>(), margin) ||
+        !rig_.right.contains(pixels->tail<2>(), margin))
+      continue;
+    Landmark& landmark = landmarks_[one.id];
+    ++landmark.expected;
+    if (landmark.expected < options_.ageing_frames ||
+        landmark.sightings >= options_.ageing_share * landmark.expected)
+      continue;
+    forget(one.id);
+    ++record_.aged;
+  }
+}
+
+/// Landmarks that are where an agreeing one is and look like it are that one: the younger goes. Its sightings
+/// are not taken over, so that nothing is counted twice.
+void Pipeline::merge_twins(const Located& located) {
+  std::vector<LandmarkId> seen;
+  std::vector<FreePoint> points;
+  std::vector<LandmarkId> landmark_of(locals_.size());
+  for (const Match& match : located.agreed) {
+    const LocalLandmark& local = locals_[match.local];
+    seen.push_back(match.landmark);
+    landmark_of[match.local] = match.landmark;
+    points.push_back({match.local,
+                      local.left_pixel,
+                      local.right_pixel,
+                      {left_->descriptor(local.point), left_->keypoints[local.point].laplacian}});
+  }
+  std::ranges::sort(seen);
+  std::vector<ExpectedLandmark> others;
+  for (const ExpectedLandmark& one : expected_)
+    if (!std::ranges::binary_search(seen, one.id)) others.push_back(one);
+  const GuidedMatchingOptions near{options_.twin_radius, options_.store.max_distance};
+  for (const GuidedMatch& twin : match_guided(rig_, T_world_camera_, std::move(points), others, near)) {
+    LandmarkId kept = landmark_of[twin.point], gone = twin.landmark;
+    if (!map_.contains(kept) || !map_.contains(gone)) continue;
+    if (std::pair(landmarks_[gone].first_seen, gone) < std::pair(landmarks_[kept].first_seen, kept))
+      std::swap(kept, gone);
+    Landmark& older = landmarks_[kept];
+    older.sightings += landmarks_[gone].sightings;
+    older.expected += landmarks_[gone].expected;
+    older.last_seen = std::max(older.last_seen, landmarks_[gone].last_seen);
+    store_->merge(kept, gone);
+    map_.forget(gone);
+    landmarks_.remove(gone);
+    ++record_.merged;
   }
 }
 
@@ -470,9 +564,32 @@ SavedMap Pipeline::map() const {
   return saved;
 }
 
+/// Every frame keeps its place beside the keyframe that was newest then; where that has left, it moves as the
+/// frames nearest in time do whose keyframe is there.
+std::vector<cairn::SE3> Pipeline::corrected_path() const {
+  const std::vector<FrameRecord>& frames = record_.frames;
+  std::vector<std::size_t> known;
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    if (map_.keyframe_pose(frames[i].reference)) known.push_back(i);
+  std::vector<cairn::SE3> path;
+  std::size_t next = 0;  // of the known, the first at or after frame i
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    path.push_back(frames[i].T_world_camera);
+    if (known.empty()) continue;
+    while (next < known.size() && known[next] < i) ++next;
+    std::size_t nearest = next == known.size() ? known.back() : known[next];
+    if (next > 0 && i - known[next - 1] < std::max(nearest, i) - i) nearest = known[next - 1];
+    const FrameRecord& of = frames[nearest];
+    path.back() = *map_.keyframe_pose(of.reference) * of.T_world_reference.inverse() * path.back();
+  }
+  return path;
+}
+
 RunRecord Pipeline::record() {
   RunRecord record = record_;
   record.variance_factor = noise_factors_.poses();
+  record.rig = rig_;
+  record.corrected = corrected_path();
   if (const auto rig = map_.rig_correction()) {
     record.calibration.numbers = rig->mean;
     record.calibration.sigmas = rig->covariance.diagonal().cwiseSqrt();

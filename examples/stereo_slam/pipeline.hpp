@@ -34,6 +34,7 @@
 #include "guided_matching.hpp"
 #include "landmark_store.hpp"
 #include "landmarks.hpp"
+#include "loop_watch.hpp"
 #include "noise_factors.hpp"
 #include "run_record.hpp"
 #include "saved_map.hpp"
@@ -85,7 +86,11 @@ struct PipelineOptions {
   /// it was at best since the last one.
   double keyframe_share = 0.8;
   std::size_t max_landmarks = 40000;  ///< the least seen leave when there are more
+  int ageing_frames = 30;     ///< so often a landmark must have been expected before it can be too old:
+  double ageing_share = 0.1;  ///< when it was found in less than this share of them
+  double twin_radius = 1.5;   ///< landmarks nearer than this in both images may be the same [pixels]
   cairn::KeyframeMapOptions map;
+  LoopWatchOptions loops;
   std::size_t sample_frame = 0;  ///< the frame shown with its matches in the report
   bool localise = false;         ///< a loaded map stays as it is: no keyframe, no landmark more
 };
@@ -146,6 +151,11 @@ private:
   void add_landmarks(const std::vector<Match>& known, const StereoFrame& frame);
   void close_step();
   void keep_bounded();
+  void note_loop(const Located& located);
+  void age(const Located& located);
+  void merge_twins(const Located& located);
+  void forget(LandmarkId id);
+  [[nodiscard]] std::vector<cairn::SE3> corrected_path() const;
   void calibrate(const std::vector<Match>& agreed);
   void take_rig(const cairn::StereoRig& rig);
   void look_through(const cairn::StereoRig& rig);
@@ -172,8 +182,10 @@ private:
   Landmarks landmarks_;
   cairn::KeyframeMap map_;
   NoiseFactors noise_factors_;
-  bool lost_ = false;      // where the camera is is not known from the frame before
-  double best_share_ = 0;  // of a frame's points that the map knew, since the last keyframe
+  LoopWatch loop_watch_;
+  std::vector<ExpectedLandmark> expected_;  // of the second look
+  bool lost_ = false;                       // where the camera is is not known from the frame before
+  double best_share_ = 0;                   // of a frame's points that the map knew, since the last keyframe
   std::vector<LocalLandmark> locals_;
   cairn::SE3 T_world_camera_;
   cairn::SE3 T_last_camera_;  // motion of the last step, for the prediction

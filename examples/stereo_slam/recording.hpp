@@ -53,6 +53,18 @@ struct Recording {
 /// EuRoC: mav0/cam0, mav0/cam1 and, where there is one, mav0/state_groundtruth_estimate0.
 [[nodiscard]] Recording read_euroc(const std::filesystem::path& folder);
 
+/// Pairs of images by the shell's patterns for their names, without a rig.
+struct ImageGlobs {
+  std::string left, right;     ///< as in "drive/left/*.png"
+  std::optional<double> rate;  ///< frames a second; nothing: the names are times, where they look like some
+};
+
+/// Images are paired by the last number in their names where they have some in common (those without a
+/// partner are left out, and notes say so), otherwise in order if they are as many. Names with 13, 16 or 19
+/// digits are times since 1970 in milli-, micro- or nanoseconds, those with a decimal point seconds; names
+/// are sorted as people count. Throws where there is no image or they do not pair up.
+[[nodiscard]] Recording read_images(const ImageGlobs& images);
+
 /// The image files (.png, .pgm) of a folder, sorted by name. Throws where there are none.
 [[nodiscard]] std::vector<std::filesystem::path> image_files(const std::filesystem::path& folder,
                                                              const std::string& expected);

@@ -15,6 +15,7 @@
 
 #include <cairn/core/linalg.hpp>
 #include <cairn/geometry/rig_correction.hpp>
+#include <cairn/geometry/stereo_rig.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/vision/image.hpp>
 
@@ -38,10 +39,12 @@ struct FrameRecord {
   int stereo_matches = 0;
   int map_matches = 0;
   int inliers = 0;
-  std::size_t landmarks = 0;  ///< in the map after this frame
-  std::size_t keyframes = 0;  ///< the same
-  bool keyframe = false;      ///< this frame became one
-  double fit = 0;             ///< median chi^2 of the inliers over what right sigmas make it; 0: none
+  std::size_t landmarks = 0;     ///< in the map after this frame
+  std::size_t keyframes = 0;     ///< the same
+  bool keyframe = false;         ///< this frame became one
+  std::size_t reference = 0;     ///< the newest keyframe, in the order of adding
+  cairn::SE3 T_world_reference;  ///< its pose as it was then
+  double fit = 0;                ///< median chi^2 of the inliers over what right sigmas make it; 0: none
   std::array<double, stage_names.size()> milliseconds{};
 };
 
@@ -80,6 +83,14 @@ struct CalibrationRecord {
   cairn::RigState numbers = cairn::RigState::Zero(), sigmas = cairn::RigState::Zero();
 };
 
+/// A place that is met again after it was out of view for long.
+struct LoopClosure {
+  std::size_t frame = 0;                     ///< its place in the record
+  std::size_t landmarks = 0;                 ///< that came back
+  int away = 0;                              ///< steps for which these had been out of view, median
+  std::optional<cairn::SE3> T_world_before;  ///< pose of the frame by the other landmarks alone
+};
+
 struct RunRecord {
   std::string dataset;
   std::string features, store;
@@ -90,7 +101,12 @@ struct RunRecord {
   std::vector<FrameRecord> frames;
   std::vector<LandmarkRecord> landmarks;
   CalibrationRecord calibration;
-  double variance_factor = 1;  ///< by which variances are larger than the pixel sigma says, at the end
+  cairn::StereoRig rig;  ///< as it is believed to be at the end
+  std::vector<LoopClosure> loops;
+  std::vector<cairn::SE3> corrected;  ///< T_world_camera of every frame as the map has it at the end
+  std::size_t merged = 0;             ///< landmarks that were another's twin
+  std::size_t aged = 0;               ///< landmarks that were not found where they should be
+  double variance_factor = 1;         ///< by which variances are larger than the pixel sigma says, at the end
   std::optional<SampleFrame> sample;
   std::vector<std::string> notes;          ///< what the reader should know: skipped frames, lost frames
   std::optional<std::string> ended_early;  ///< after which frame the run ended and why, where it did

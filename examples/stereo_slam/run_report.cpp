@@ -66,6 +66,7 @@ void add_figures(example::Report& report, const Summary& summary) {
   report.figure({"path", readable(summary.path), "m", ""});
   report.figure({"landmarks", std::to_string(summary.landmarks), "", "in the map at the end"});
   report.figure({"keyframes", std::to_string(summary.keyframes), "", "in the map at the end"});
+  report.figure({"loops closed", std::to_string(summary.loops_closed), "", "places met again after long"});
   report.figure({"inliers", readable(summary.inliers), "", "median of a frame"});
   if (!summary.errors) return;
   const TruthErrors& errors = *summary.errors;
@@ -86,6 +87,107 @@ void add_figures(example::Report& report, const Summary& summary) {
   if (errors.revisit)
     report.figure({"same place again", readable(errors.revisit->position), "m",
                    "largest disagreement of " + std::to_string(errors.revisit->pairs) + " returns"});
+}
+
+/// The path as it was known while driving and as the map has it at the end, errors drawn so much larger that
+/// they can be seen: about the truth, or about the path at the end where there is none.
+std::optional<example::PlaneFilm> correction_film(const RunRecord& run, const Summary& summary) {
+  if (run.corrected.size() != run.frames.size() || run.frames.size() < 2) return std::nullopt;
+  using Place = std::array<double, 2>;
+  const auto place = [](const cairn::SE3& T) { return Place{T.translation()(0), T.translation()(2)}; };
+  const bool all_true =
+      std::ranges::all_of(run.frames, [](const FrameRecord& f) { return f.truth.has_value(); });
+  std::vector<Place> about;
+  std::array<double, 4> box{gap, gap, gap, gap};
+  double largest = 0;
+  for (std::size_t i = 0; i < run.frames.size(); ++i) {
+    const FrameRecord& frame = run.frames[i];
+    about.push_back(place(all_true ? *frame.truth : run.corrected[i]));
+    for (const cairn::SE3& T : {frame.T_world_camera, run.corrected[i]})
+      for (std::size_t k = 0; k < 2; ++k) {
+        largest = std::max(largest, std::abs(place(T)[k] - about.back()[k]));
+        box[k] = std::fmin(box[k], about.back()[k]);
+        box[k + 2] = std::fmax(box[k + 2], about.back()[k]);
+      }
+  }
+  const double extent = std::max(box[2] - box[0], box[3] - box[1]);
+  if (!(largest > 1e-9 * extent) || !(extent > 0)) return std::nullopt;
+  constexpr double shown = 0.04;  // of the drawing
+  const double zoom = std::max(1.0, std::pow(10.0, std::floor(std::log10(shown * extent / largest))));
+  const auto curve = [&](double share) {
+    example::PlaneCurve path{"estimate", Ink::belief, {}, {}};
+    for (std::size_t i = 0; i < run.frames.size(); ++i) {
+      const Place before = place(run.frames[i].T_world_camera), after = place(run.corrected[i]);
+      const auto at = [&](std::size_t k) {
+        return about[i][k] + zoom * ((1 - share) * before[k] + share * after[k] - about[i][k]);
+      };
+      path.x.push_back(at(0));
+      path.y.push_back(at(1));
+    }
+    return path;
+  };
+  example::PlaneFilm film{.title = "What meeting places again changed",
+                          .caption = "",
+                          .x = {"right", "m"},
+                          .y = {"ahead", "m"},
+                          .slider = {"from while driving (0) to the map at the end (1)", ""},
+                          .still = {},
+                          .frames = {}};
+  film.caption =
+      std::string("Distances from the ") + (all_true ? "truth" : "path at the end") +
+      (zoom > 1 ? " are drawn " + example::readable(zoom) + " times as large. " : " as they are. ");
+  if (run.loops.empty()) film.caption += "No place was met again after it had been out of view for long.";
+  example::PlaneCurve still{
+      all_true ? "truth" : "path at the end", all_true ? Ink::truth : Ink::grey, {}, {}};
+  for (const Place& one : about) {
+    still.x.push_back(one[0]);
+    still.y.push_back(one[1]);
+  }
+  film.still.push_back(std::move(still));
+  if (!run.loops.empty()) {
+    example::PlaneCurve met{"met again", Ink::measurement, {}, {}, true};
+    for (const LoopClosure& loop : run.loops) {
+      met.x.push_back(about[loop.frame][0]);
+      met.y.push_back(about[loop.frame][1]);
+    }
+    film.still.push_back(std::move(met));
+  }
+  constexpr int steps = 10;
+  for (int step = 0; step <= steps; ++step) {
+    example::PlaneFrame frame{
+        static_cast<double>(step) / steps, "", {curve(static_cast<double>(step) / steps)}};
+    if (step == 0) {
+      frame.caption = "As it was estimated while driving";
+      if (summary.path_error)
+        frame.caption += ", RMSE " + example::readable(summary.path_error->while_driving) + " m";
+    } else if (step == steps) {
+      frame.caption = "As the map has it at the end";
+      if (summary.path_error)
+        frame.caption += ", RMSE " + example::readable(summary.path_error->at_the_end) + " m";
+    } else {
+      frame.caption = "Between the two";
+    }
+    film.frames.push_back(std::move(frame));
+  }
+  return film;
+}
+
+std::optional<example::Table> loop_table(const Summary& summary) {
+  if (summary.loops.empty()) return std::nullopt;
+  example::Table table{.title = "Places met again",
+                       .caption =
+                           "Pose of the first frame of each return, by the landmarks that were in view "
+                           "just before alone and with those that came back.",
+                       .columns = {"frame", "landmarks back", "after frames", "moved by [m]",
+                                   "turned by [deg]", "error before [m]", "error after [m]"},
+                       .rows = {}};
+  for (const LoopEffect& loop : summary.loops)
+    table.rows.push_back({std::to_string(loop.frame), std::to_string(loop.landmarks),
+                          std::to_string(loop.away), example::readable(loop.correction.position),
+                          example::readable(loop.correction.heading * degrees),
+                          loop.before ? example::readable(loop.before->position) : "no truth",
+                          loop.after ? example::readable(loop.after->position) : "no truth"});
+  return table;
 }
 
 example::PlanePlot path_plot(const RunRecord& run) {
@@ -260,6 +362,8 @@ example::Report run_report(const RunRecord& run, const Summary& summary) {
   const TimeAxis time = time_axis(run);
   report.add(map_cloud(run));
   report.add(path_plot(run));
+  if (const auto film = correction_film(run, summary)) report.add(*film);
+  if (const auto table = loop_table(summary)) report.add(*table);
   report.add(sample_picture(run));
   report.add(error_plot(run, time, false));
   report.add(error_plot(run, time, true));

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <span>
+#include <utility>
 
 #include <nlohmann/json.hpp>
 
@@ -117,6 +118,25 @@ Json number(std::optional<double> value) {
   return value && std::isfinite(*value) ? Json(*value) : Json(nullptr);
 }
 
+Json loops_json(const Summary& summary) {
+  Json loops = Json::array();
+  const auto append = [](Json& one, const std::string& name, const std::optional<FrameError>& error) {
+    one[name + "_m"] = error ? number(error->position) : Json(nullptr);
+    one[name + "_deg"] = error ? number(error->heading * degrees) : Json(nullptr);
+  };
+  for (const LoopEffect& loop : summary.loops) {
+    Json one;
+    one["frame"] = loop.frame;
+    one["landmarks"] = loop.landmarks;
+    one["frames_away"] = loop.away;
+    append(one, "correction", loop.correction);
+    append(one, "error_before", loop.before);
+    append(one, "error_after", loop.after);
+    loops.push_back(std::move(one));
+  }
+  return loops;
+}
+
 void append_errors(Json& json, const Summary& summary) {
   const auto& errors = summary.errors;
   const auto of = [&](auto&& get) -> Json { return errors ? number(get(*errors)) : Json(nullptr); };
@@ -180,6 +200,40 @@ std::optional<RevisitError> revisit_error(const std::vector<cairn::PosePair>& pa
   return result;
 }
 
+std::vector<LoopEffect> loop_effects(const RunRecord& run) {
+  std::vector<LoopEffect> effects;
+  for (const LoopClosure& loop : run.loops) {
+    if (!loop.T_world_before || loop.frame >= run.frames.size()) continue;
+    const FrameRecord& frame = run.frames[loop.frame];
+    LoopEffect effect{frame.index, loop.landmarks,
+                      loop.away,   frame_error(frame.T_world_camera, *loop.T_world_before),
+                      {},          {}};
+    if (frame.truth) {
+      effect.before = frame_error(*loop.T_world_before, *frame.truth);
+      effect.after = frame_error(frame.T_world_camera, *frame.truth);
+    }
+    effects.push_back(effect);
+  }
+  return effects;
+}
+
+std::optional<PathError> path_error(const RunRecord& run) {
+  if (run.corrected.size() != run.frames.size()) return std::nullopt;
+  PathError sum;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < run.frames.size(); ++i) {
+    const FrameRecord& frame = run.frames[i];
+    if (!frame.truth) continue;
+    const cairn::Vector<3>& truth = frame.truth->translation();
+    sum.while_driving += (frame.T_world_camera.translation() - truth).squaredNorm();
+    sum.at_the_end += (run.corrected[i].translation() - truth).squaredNorm();
+    ++count;
+  }
+  if (count == 0) return std::nullopt;
+  const auto frames = static_cast<double>(count);
+  return PathError{std::sqrt(sum.while_driving / frames), std::sqrt(sum.at_the_end / frames)};
+}
+
 Summary summarise(const RunRecord& run) {
   expect_frames(run);
   Summary summary;
@@ -195,6 +249,9 @@ Summary summarise(const RunRecord& run) {
   summary.inliers = median_over_frames(run, &FrameRecord::inliers);
   summary.landmarks = run.landmarks.size();
   summary.path = path_length(run);
+  summary.loops_closed = run.loops.size();
+  summary.loops = loop_effects(run);
+  summary.path_error = path_error(run);
   const std::vector<cairn::PosePair> pairs = truth_pairs(run);
   summary.keyframes = run.frames.back().keyframes;
   if (pairs.empty()) return summary;
@@ -217,6 +274,14 @@ std::string summary_json(const RunRecord& run, const Summary& summary) {
   json["inliers"] = number(summary.inliers);
   json["landmarks"] = summary.landmarks;
   json["keyframes"] = summary.keyframes;
+  json["landmarks_merged"] = run.merged;
+  json["landmarks_aged"] = run.aged;
+  json["loops_closed"] = summary.loops_closed;
+  json["loops"] = loops_json(summary);
+  json["path_rmse_while_driving_m"] =
+      summary.path_error ? number(summary.path_error->while_driving) : Json(nullptr);
+  json["path_rmse_at_the_end_m"] =
+      summary.path_error ? number(summary.path_error->at_the_end) : Json(nullptr);
   append_errors(json, summary);
   json["features"] = run.features;
   json["store"] = run.store;

@@ -72,6 +72,22 @@ struct TruthErrors {
   std::optional<PoseConsistency> consistency;       ///< nothing where no frame claims a covariance
 };
 
+/// What meeting a place again was worth.
+struct LoopEffect {
+  std::size_t frame = 0;  ///< as the data set numbers it
+  std::size_t landmarks = 0;
+  int away = 0;                             ///< steps
+  FrameError correction;                    ///< how far the landmarks that came back moved the pose
+  std::optional<FrameError> before, after;  ///< distance from the truth, without and with them
+};
+
+/// How far the path is from the truth, as it was estimated while driving and as the map has it at the end:
+/// RMSE of positions, the first poses coinciding [m].
+struct PathError {
+  double while_driving = 0;
+  double at_the_end = 0;
+};
+
 struct Summary {
   std::size_t frames = 0;
   std::size_t frames_tracked = 0;
@@ -83,7 +99,10 @@ struct Summary {
   double inliers = 0;
   std::size_t landmarks = 0;
   std::size_t keyframes = 0;  ///< in the map at the end
-  double path = 0;            ///< [m], of the truth where every frame has one, otherwise of the estimate
+  std::size_t loops_closed = 0;
+  std::vector<LoopEffect> loops;
+  std::optional<PathError> path_error;
+  double path = 0;  ///< [m], of the truth where every frame has one, otherwise of the estimate
   std::optional<TruthErrors> errors;
 };
 
@@ -95,6 +114,12 @@ struct Timing {
 
 /// The frames that have a truth, in order.
 [[nodiscard]] std::vector<cairn::PosePair> truth_pairs(const RunRecord& run);
+
+/// What each loop closure was worth; those of which the pose without it is not known are left out.
+[[nodiscard]] std::vector<LoopEffect> loop_effects(const RunRecord& run);
+
+/// Nothing without truth, or without a corrected path.
+[[nodiscard]] std::optional<PathError> path_error(const RunRecord& run);
 
 /// Distance of an estimated pose from the true one.
 [[nodiscard]] FrameError frame_error(const cairn::SE3& estimate, const cairn::SE3& truth);

@@ -261,7 +261,7 @@ TEST_SUITE("dataset") {
                }),
                {"image_0/000001.png: damaged PNG"}));
     CHECK(says(broken([](F f) { cairn::write_file_atomically(f.left(2), "no picture"); }),
-               {"image_0/000002.png: neither PNG nor PGM"}));
+               {"image_0/000002.png: neither PNG nor JPEG nor PGM"}));
     CHECK(says(broken([](F f) { example::write_png(f.right(2), cairn::Image(5, 6)); }),
                {"image_1/000002.png: the image has 5 x 6 pixels; expected 12 x 8"}));
     CHECK(says(broken([](F f) { fs::remove(f / "calib.txt"); }), {"calib.txt: no such file"}));

@@ -3,12 +3,16 @@
 #include "support/image_io.hpp"
 
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
 #include <png.h>
+#ifdef EXAMPLES_HAVE_JPEG
+#include <turbojpeg.h>
+#endif
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/random.hpp>
@@ -108,15 +112,56 @@ TEST_SUITE("image_io") {
 
   TEST_CASE("image_io: a file that is missing, a folder, empty or no image is refused by name") {
     const cairn_test::Folder folder;
-    CHECK(names(refusal(folder / "none.png"), "none.png: no such file; expected a PNG or PGM image"));
+    CHECK(names(refusal(folder / "none.png"), "none.png: no such file; expected a PNG, JPEG or PGM image"));
     CHECK(names(refusal(folder.path()), "is a folder"));
     cairn::write_file_atomically(folder / "empty.png", "");
     CHECK(names(refusal(folder / "empty.png"), "empty.png: empty file"));
     cairn::write_file_atomically(folder / "text.png", "this is a text\n");
-    CHECK(names(refusal(folder / "text.png"), "text.png: neither PNG nor PGM; expected a whole PNG or PGM"));
-    cairn::write_file_atomically(folder / "photo.png", std::string("\xff\xd8\xff\xe0 JFIF"));
-    CHECK(names(refusal(folder / "photo.png"), "neither PNG nor PGM"));
+    CHECK(names(refusal(folder / "text.png"),
+                "text.png: neither PNG nor JPEG nor PGM; expected a whole PNG, JPEG or PGM"));
+    cairn::write_file_atomically(folder / "photo.gif", "GIF89a");
+    CHECK(names(refusal(folder / "photo.gif"), "neither PNG nor JPEG nor PGM"));
+    cairn::write_file_atomically(folder / "photo.jpg", std::string("\xff\xd8\xff\xe0 JFIF"));
+    CHECK(names(refusal(folder / "photo.jpg"), "photo.jpg: "));
+    CHECK(names(refusal(folder / "photo.jpg"), "JPEG"));
   }
+
+#ifdef EXAMPLES_HAVE_JPEG
+  TEST_CASE("image_io: a JPEG reads back as the grey levels it was made of, cut off anywhere it is refused") {
+    const cairn_test::Folder folder;
+    const int width = 37, height = 21;
+    std::vector<unsigned char> grey, colour;
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x) {
+        grey.push_back(static_cast<unsigned char>(40 + 3 * x + 2 * y));
+        colour.insert(colour.end(), 3, grey.back());
+      }
+    for (const bool coloured : {false, true}) {
+      CAPTURE(coloured);
+      tjhandle handle = tjInitCompress();
+      unsigned char* bytes = nullptr;
+      unsigned long size = 0;
+      REQUIRE(tjCompress2(handle, coloured ? colour.data() : grey.data(), width, 0, height,
+                          coloured ? TJPF_RGB : TJPF_GRAY, &bytes, &size, coloured ? TJSAMP_420 : TJSAMP_GRAY,
+                          100, 0) == 0);
+      const std::string file(reinterpret_cast<const char*>(bytes), size);
+      tjFree(bytes);
+      tjDestroy(handle);
+      cairn::write_file_atomically(folder / "a.jpg", file);
+      const cairn::Image image = example::read_image(folder / "a.jpg");
+      REQUIRE(image.width() == width);
+      REQUIRE(image.height() == height);
+      for (int y = 0; y < height; ++y)
+        for (int x = 0; x < width; ++x)
+          CHECK(std::abs(image(x, y) - grey[static_cast<std::size_t>(y * width + x)]) <= 3);
+      for (std::size_t length = 3; length + 2 < size; length += 7) {
+        CAPTURE(length);
+        cairn::write_file_atomically(folder / "torn.jpg", file.substr(0, length));
+        CHECK(names(refusal(folder / "torn.jpg"), "torn.jpg: damaged JPEG"));
+      }
+    }
+  }
+#endif
 
   TEST_CASE("image_io: a PNG cut off anywhere before its last pixel is refused by name") {
     cairn::Random random(3);

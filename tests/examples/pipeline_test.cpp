@@ -164,6 +164,48 @@ TEST_SUITE("pipeline") {
     }
   }
 
+  TEST_CASE("pipeline: a place that is met again is counted, with the pose that the rest alone would give") {
+    std::vector<StereoFrame> frames = drive();
+    frames.insert(frames.end(), drive().rbegin() + 1, drive().rend());
+    PipelineOptions with = options();
+    with.loops = {.away = 6, .landmarks = 5};
+    const RunRecord record = run(frames, with);
+    REQUIRE(record.loops.size() == 1);
+    const stereo_slam::LoopClosure& loop = record.loops[0];
+    CHECK(loop.frame > drive().size());
+    CHECK(loop.landmarks >= 5);
+    CHECK(loop.away > 6);
+    REQUIRE(loop.T_world_before);
+    CHECK(cairn::local(*loop.T_world_before, record.frames[loop.frame].T_world_camera).norm() < 0.02);
+    CHECK(run(drive(), with).loops.empty());
+    REQUIRE(record.corrected.size() == frames.size());
+    for (std::size_t i = 0; i < frames.size(); ++i)
+      CHECK((record.corrected[i].translation() - record.frames[i].truth->translation()).norm() < 0.02);
+  }
+
+  TEST_CASE(
+      "pipeline: a map is kept within its bound, ages and loses twins, and the drive is followed as before") {
+    PipelineOptions bounded = options(), aged = options(), without_twins = options(), with_twins = options();
+    bounded.max_landmarks = 400;
+    aged.ageing_frames = 3;
+    aged.ageing_share = 0.9;
+    without_twins.twin_radius = 0;
+    with_twins.twin_radius = 4;
+    with_twins.store.max_distance = without_twins.store.max_distance = 0.8;
+    for (const PipelineOptions& with : {bounded, aged, with_twins}) {
+      const RunRecord record = run(drive(), with);
+      for (const FrameRecord& frame : record.frames) {
+        CHECK(frame.tracked);
+        CHECK((frame.T_world_camera.translation() - frame.truth->translation()).norm() < 0.02);
+      }
+    }
+    for (const FrameRecord& frame : run(drive(), bounded).frames) CHECK(frame.landmarks <= 400);
+    CHECK(run(drive(), aged).aged > 0);
+    CHECK(run(drive(), options()).aged == 0);
+    CHECK(run(drive(), with_twins).merged > 0);
+    CHECK(run(drive(), without_twins).merged == 0);
+  }
+
   TEST_CASE("pipeline: finds itself in a map that was saved and loaded, which stays as it is when told so") {
     stereo_slam::Pipeline mapping(rig(), options());
     for (const StereoFrame& frame : drive()) mapping.step(frame);

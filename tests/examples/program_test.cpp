@@ -2,23 +2,28 @@
 // SPDX-License-Identifier: MIT
 //
 // The program as a user meets it: its exit code, its words and what it leaves behind.
+#include <chrono>
 #include <csignal>
 #include <cstdlib>
 #include <filesystem>
 #include <initializer_list>
 #include <set>
 #include <string>
+#include <thread>
+#include <vector>
 
 #include <doctest/doctest.h>
 #include <nlohmann/json.hpp>
 #include <sys/mount.h>
 
+#include <cairn/core/random.hpp>
 #include <cairn/io/file.hpp>
 #include <cairn/io/trajectory.hpp>
 #include <cairn/version.hpp>
 
 #include "support/folder.hpp"
 #include "support/program_checks.hpp"
+#include "support/random.hpp"
 #include "support/report.hpp"
 
 namespace program_test {
@@ -147,6 +152,88 @@ TEST_SUITE("program") {
       CHECK(outcome.says((folder / bad).string() + ": "));
     }
     CHECK_FALSE(fs::exists(folder / "third" / "summary.json"));
+  }
+
+  TEST_CASE(
+      "stereo_slam: killed at any moment while it saves its map, it leaves the old map or the new one") {
+    const cairn_test::Folder folder;
+    const fs::path map = folder / "map";
+    const auto arguments = [&](int frames) {
+      return std::vector<std::string>{STEREO_SLAM_PROGRAM, "--frames", std::to_string(frames),
+                                      "--points",          "300",      "--save",
+                                      map.string(),        "--out",    (folder / "out").string()};
+    };
+    const auto made = [&](int frames) {
+      std::string line;
+      for (const std::string& word : arguments(frames)) line += "\"" + word + "\" ";
+      keep_pictures();
+      REQUIRE(cairn_test::run_program(line).code == 0);
+      return cairn::read_file(map);
+    };
+    const std::string fresh = made(3);
+    const auto start = std::chrono::steady_clock::now();
+    const std::string old = made(2);
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    REQUIRE(old != fresh);
+    cairn::Random random(cairn_test::seed());
+    int killed = 0, writing = 0, replaced = 0;
+    for (int attempt = 0; attempt < 50; ++attempt) {
+      CAPTURE(attempt);
+      cairn::write_file_atomically(map, old);
+      const pid_t child = cairn_test::start_program(arguments(3));
+      if (attempt % 2 == 0) {  // as soon as the new map is being written, or a little later
+        cairn_test::wait_for(child, [&] { return fs::exists(map.string() + ".cairn-part"); });
+        writing += fs::exists(map.string() + ".cairn-part") ? 1 : 0;
+        std::this_thread::sleep_for(std::chrono::microseconds(random.below(1500)));
+      } else {
+        std::this_thread::sleep_for(std::chrono::duration<double>(random.uniform(0.5, 1.2) * seconds));
+      }
+      killed += cairn_test::kill_program(child) ? 1 : 0;
+      const std::string left = cairn::read_file(map);
+      CHECK((left == old || left == fresh));
+      replaced += left == fresh ? 1 : 0;
+    }
+    MESSAGE(killed << " killed, " << writing << " of them while writing; " << replaced
+                   << " left the new map");
+    CHECK(killed >= 10);
+    CHECK(made(3) == fresh);
+    CHECK(names_in(folder.path()) == std::set<std::string>{"map", "out"});
+  }
+
+  TEST_CASE("stereo_slam: anybody's images need a rig and both sides, and every want is worded") {
+    const cairn_test::Folder folder;
+    const auto named = [&](const char* name) { return "\"" + (folder / name).string() + "\""; };
+    make_drive(folder, 3);
+    const std::string images = " --left " + named("drive/image_0/*.png") + " --right " +
+                               named("drive/image_1/*.png") + " --out " + named("out");
+    cairn_test::check_mistakes(
+        [&](const std::string& mistake) { return run(mistake + " --out " + named("out")); },
+        {"--left " + named("drive/image_0/*.png"), "--right " + named("drive/image_1/*.png"), "--fps 10",
+         "--fps 0 --camera x --left a --right b", "--camera " + named("rig.yaml")});
+    CHECK(
+        run("--camera " + named("rig.yaml") + images).says("rig.yaml: no such file; expected a stereo rig"));
+    CHECK(run("--dataset euroc . --camera " + named("rig.yaml") + images).code == 2);
+    CHECK_FALSE(fs::exists(folder / "out"));
+#ifdef EXAMPLES_HAVE_YAML
+    REQUIRE(run("--dataset kitti_odometry " + named("drive") + " --calibrate on --save-rig " +
+                named("rig.yaml") + " --out " + named("out"))
+                .code == 0);
+    const Outcome outcome = run("--camera " + named("rig.yaml") + images + " --fps 20");
+    CAPTURE(outcome.words);
+    CHECK(outcome.code == 0);
+    CHECK(names_in(folder / "out") == results());
+    CHECK(summary_in(folder / "out")["frames_lost"] == 0);
+    CHECK(cairn::read_tum(folder / "out" / "trajectory.tum")[1].time == 0.05);
+    std::string rig = cairn::read_file(folder / "rig.yaml");
+    CHECK(rig.find("rotation_sigma: [") != std::string::npos);
+    const std::string size = "image_size: [768, 576]";
+    for (std::size_t at = rig.find(size); at != std::string::npos; at = rig.find(size))
+      rig.replace(at, size.size(), "image_size: [640, 480]");
+    cairn::write_file_atomically(folder / "rig.yaml", rig);
+    CHECK(run("--camera " + named("rig.yaml") + images)
+              .says("the image has 768 x 576 pixels; expected 640 x 480 pixels as the calibrated camera"));
+    CHECK(summary_in(folder / "out")["frames"] == 3);  // of the run before
+#endif
   }
 
   TEST_CASE("stereo_slam: where the first image is torn there is nothing to write, and old results stay") {

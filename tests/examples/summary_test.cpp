@@ -117,6 +117,33 @@ TEST_CASE(
   CHECK(json_of(run)["pose_nees_mean"].is_null());
 }
 
+TEST_CASE("summary: what meeting a place again was worth, and the path before and after") {
+  RunRecord run = straight_run(10);
+  for (std::size_t i = 0; i < 10; ++i) {
+    run.frames[i].T_world_camera = *run.frames[i].truth * pose(0.3, 0, 0.4);
+    run.corrected.push_back(*run.frames[i].truth * pose(0, 0.1, 0));
+  }
+  CHECK(json_of(run)["loops_closed"] == 0);
+  CHECK(json_of(run)["loops"].empty());
+  run.loops.push_back({4, 30, 77, *run.frames[4].truth * pose(0.3, 0, 1.4, 2 * degree)});
+  run.loops.push_back({5, 31, 78, std::nullopt});
+  const nlohmann::json json = json_of(run);
+  CHECK(json["loops_closed"] == 2);
+  REQUIRE(json["loops"].size() == 1);
+  const nlohmann::json& loop = json["loops"][0];
+  CHECK(loop["frame"] == 4);
+  CHECK(loop["landmarks"] == 30);
+  CHECK(loop["frames_away"] == 77);
+  CHECK(loop["correction_m"].get<double>() == Approx(1.0));
+  CHECK(loop["correction_deg"].get<double>() == Approx(2.0));
+  CHECK(loop["error_before_m"].get<double>() == Approx(std::hypot(0.3, 1.4)));
+  CHECK(loop["error_after_m"].get<double>() == Approx(0.5));
+  CHECK(json["path_rmse_while_driving_m"].get<double>() == Approx(0.5));
+  CHECK(json["path_rmse_at_the_end_m"].get<double>() == Approx(0.1));
+  run.frames.resize(9);  // a path that is not this run's
+  CHECK(json_of(run)["path_rmse_at_the_end_m"].is_null());
+}
+
 TEST_CASE("summary: the same place looked at in another direction is no return") {
   RunRecord run = straight_run(60);
   for (std::size_t i = 0; i < 60; ++i)

@@ -60,6 +60,42 @@ inline bool handles(pid_t process, int signal) {
   return false;
 }
 
+/// Starts the program with its words going nowhere; returns its process.
+inline pid_t start_program(std::vector<std::string> command) {
+  const pid_t child = ::fork();
+  if (child == 0) {
+    const int nowhere = ::open("/dev/null", O_WRONLY);
+    ::dup2(nowhere, STDERR_FILENO);
+    ::dup2(nowhere, STDOUT_FILENO);
+    std::vector<char*> arguments;
+    for (std::string& word : command) arguments.push_back(word.data());
+    arguments.push_back(nullptr);
+    ::execv(arguments[0], arguments.data());
+    ::_exit(127);
+  }
+  return child;
+}
+
+/// Waits until `there` is true or the program has ended (which kill_program() then tells).
+template <class There>
+void wait_for(pid_t child, const There& there) {
+  siginfo_t ended{};
+  while (!there()) {
+    if (::waitid(P_PID, static_cast<id_t>(child), &ended, WEXITED | WNOHANG | WNOWAIT) != 0 ||
+        ended.si_pid != 0)
+      return;
+    std::this_thread::sleep_for(std::chrono::microseconds(50));
+  }
+}
+
+/// Kills the program, which cannot be caught, and waits for its end. False where it had ended by itself.
+inline bool kill_program(pid_t child) {
+  ::kill(child, SIGKILL);
+  int status = 0;
+  ::waitpid(child, &status, 0);
+  return WIFSIGNALED(status);
+}
+
 /// Starts the program, sends it the signals, the first when it has said `lines` lines on standard error, each
 /// further one when the one before was taken. Returns its exit code; minus the signal where that ended it.
 inline int interrupt_program(std::vector<std::string> command, std::initializer_list<int> signals,

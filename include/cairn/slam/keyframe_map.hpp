@@ -132,6 +132,11 @@ public:
       if (poses_.contains(keyframe.block)) poses.push_back(poses_.mean(keyframe.block).T_world_body);
     return poses;
   }
+  /// The pose of the keyframe that was added as number `index`, 0 the first; nothing where it has left.
+  [[nodiscard]] std::optional<SE3> keyframe_pose(std::size_t index) const {
+    if (index >= keyframes_.size() || !poses_.contains(keyframes_[index].block)) return std::nullopt;
+    return poses_.mean(keyframes_[index].block).T_world_body;
+  }
   /// Their joint covariance, steps in the world.
   [[nodiscard]] Matrix<dynamic, dynamic> covariance() const {
     std::vector<AnyBlockId> ids;
@@ -618,7 +623,7 @@ private:
     for (std::uint32_t k = 0; k + 1 < keyframes_.size(); ++k) {
       if (!poses_.contains(keyframes_[k].block)) continue;
       if (keyframes_[k].sightings == 0)
-        static_cast<void>(poses_.marginalise(keyframes_[k].block));
+        leave(keyframes_[k]);
       else
         there.push_back(k);
     }
@@ -642,10 +647,16 @@ private:
         break;
       }
     keyframes_[keyframe].sightings = 0;
-    keyframes_[keyframe].saw = {};
     for (const std::uint32_t id : empty) drop(id);
-    static_cast<void>(poses_.marginalise(keyframes_[keyframe].block));
+    leave(keyframes_[keyframe]);
     change();
+  }
+
+  /// Nothing of it stays but its number, so that a map that lives for days does not grow.
+  void leave(Keyframe& keyframe) {
+    static_cast<void>(poses_.marginalise(keyframe.block));
+    keyframe.saw = {};
+    keyframe.view.reset();
   }
 
   KeyframeMapOptions options_;
