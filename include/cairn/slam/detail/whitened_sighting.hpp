@@ -86,7 +86,8 @@ public:
 
   /// Adds this camera's part for a point at p in its frame, R from world axes. False beside the view.
   [[nodiscard]] bool add(const Matrix<3>& R, const Vector<3>& p, double nearest, PointStatistics& s,
-                         const RigDerivatives* by_rig = nullptr, RigStatistics* rig = nullptr) const noexcept {
+                         const RigDerivatives* by_rig = nullptr,
+                         RigStatistics* rig = nullptr) const noexcept {
     constexpr double widest = 10;  // tangent of 84 degrees
     const double reach = widest * p(2);
     if (!(p(2) > nearest && p(0) < reach && -p(0) < reach && p(1) < reach && -p(1) < reach)) return false;
