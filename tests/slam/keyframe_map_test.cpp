@@ -316,6 +316,33 @@ TEST_SUITE("keyframe_map") {
     CHECK(learning.mean_nees() < 14);
   }
 
+  TEST_CASE(
+      "keyframe_map: a street whose points are first seen from afar is neither too long nor too short") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    for (const bool with_rig : {false, true}) {
+      CAPTURE(with_rig);
+      KeyframeMapOptions options;
+      if (with_rig) options.rig.rotation = options.rig.direction = 5e-4;
+      constexpr int streets = 5;
+      double along = 0, nees = 0, yaw = 0;  // in standard deviations
+      for (std::uint64_t i = 0; i < streets; ++i) {
+        KeyframeMap map(cairn_test::car_rig(), options);
+        const auto run = cairn_test::run_arena(cairn_test::street_frames(seed + 10 * i, 70), map,
+                                               {.unknown = 0.3, .apart = 3});
+        CHECK(run.lost == 0);
+        along += run.last_error(2) / std::sqrt(run.last_covariance(2, 2)) / streets;
+        nees += run.mean_nees() / streets;
+        if (const auto rig = map.rig_correction())
+          yaw += rig->mean(1) / std::sqrt(rig->covariance(1, 1)) / streets;
+      }
+      CHECK(std::abs(along) < 4 / std::sqrt(1.0 * streets));
+      CHECK(std::abs(yaw) < 4 / std::sqrt(1.0 * streets));
+      CHECK(nees > 2.5);
+      CHECK(nees < 12);
+    }
+  }
+
   TEST_CASE("keyframe_map: rigs that are off by what their sigmas say are found, as well as it says") {
     const auto seed = cairn_test::seed();
     CAPTURE(seed);

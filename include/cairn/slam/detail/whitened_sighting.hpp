@@ -116,13 +116,14 @@ private:
     double of_rig[rig_numbers] = {};
     int first = RigDerivatives::of_point;
     const double centre = by.nominal_focal(i) * inverse_sigma_;
-    of_rig[6] = from_centre_(i);
+    const double from_centre = from_centre_(i) - r;  // as predicted: the noise of r may not see itself
+    of_rig[6] = from_centre;
     of_rig[8 + i] = centre;
     if (by.right) {
       first = 0;
       for (int c = 0; c < RigDerivatives::of_point; ++c)
         of_rig[c] = j(0) * by.point(0, c) + j(1) * by.point(1, c) + j(2) * by.point(2, c);
-      of_rig[7] = from_centre_(i);
+      of_rig[7] = from_centre;
       of_rig[10 + i] = centre;
     }
     for (int c = first; c < rig_numbers; ++c) {
