@@ -33,6 +33,7 @@
 #include "saved_map.hpp"
 #include "summary.hpp"
 #include "support/scoreboard.hpp"
+#include "there_and_back.hpp"
 
 namespace {
 
@@ -46,11 +47,12 @@ struct Run {
   double cpu_milliseconds = 0;  ///< of a pair, without reading it
 };
 
-Run run(const stereo_slam::DatasetOptions& what, stereo_slam::PipelineOptions how) {
+Run run(const stereo_slam::DatasetOptions& what, stereo_slam::PipelineOptions how, bool and_back = false) {
   std::cout << "running " << what.kind << ' '
             << (what.folder.empty() ? what.arena.script : what.folder.string()) << ", seed " << how.seed
             << std::endl;
-  const auto frames = stereo_slam::open_dataset(what);
+  auto frames = stereo_slam::open_dataset(what);
+  if (and_back) frames = stereo_slam::there_and_back(std::move(frames));
   stereo_slam::Pipeline pipeline(frames->rig(), how);
   double cpu = 0;
   for (std::size_t i = 0; i < frames->size(); ++i) {
@@ -180,8 +182,24 @@ void add_arena_rows(Scoreboard& board) {
              .note = over});
 }
 
+/// The right camera turns by 0.05 degrees in 100 frames.
+void add_drift_row(Scoreboard& board) {
+  stereo_slam::DatasetOptions what;
+  what.kind = "arena";
+  what.arena.script = "loop";
+  what.arena.drift = 0.05;
+  stereo_slam::PipelineOptions how;
+  how.calibrate = stereo_slam::Calibration::drifting;
+  board.add({.name = "arena loop on a rig that drifts: largest position error",
+             .measured = run(what, how).summary.errors.value().largest.position,
+             .unit = "m",
+             .must = 0.03,
+             .aim = 0.01,
+             .note = "--drift 0.05 --calibrate drifting"});
+}
+
 std::optional<Run> run_drive(const std::string& name, const std::string& kind,
-                             stereo_slam::Calibration calibrate) {
+                             stereo_slam::Calibration calibrate, bool and_back = false) {
   const char* data = std::getenv("CAIRN_DATA");
   stereo_slam::DatasetOptions what;
   what.kind = kind;
@@ -189,7 +207,7 @@ std::optional<Run> run_drive(const std::string& name, const std::string& kind,
   if (!fs::exists(what.folder)) return std::nullopt;
   stereo_slam::PipelineOptions how;
   how.calibrate = calibrate;
-  return run(what, how);
+  return run(what, how, and_back);
 }
 
 /// A row of a drive, or why there is none.
@@ -199,12 +217,29 @@ void add(Scoreboard& board, Row row, const std::optional<double>& measured, bool
   board.add(std::move(row));
 }
 
+/// Mean NEES of the poses from a frame on, whose truth is taken for the world's beginning.
+std::optional<double> nees_from(const stereo_slam::RunRecord& run, std::size_t first) {
+  const stereo_slam::FrameRecord& begin = run.frames.at(first);
+  if (!begin.truth) return std::nullopt;
+  const cairn::SE3 T_estimate_truth = begin.T_world_camera * begin.truth->inverse();
+  double sum = 0, count = 0;
+  for (std::size_t i = first + 1; i < run.frames.size(); ++i) {
+    stereo_slam::FrameRecord frame = run.frames[i];
+    if (frame.truth) frame.truth = T_estimate_truth * *frame.truth;
+    if (const auto nees = stereo_slam::pose_nees(frame)) {
+      sum += *nees;
+      ++count;
+    }
+  }
+  return count > 0 ? std::optional(sum / count) : std::nullopt;
+}
+
 /// The first 12 poses of the reference are filled in (docs/design.md): the drive begins after them.
 void add_odometry_rows(Scoreboard& board, stereo_slam::Calibration calibrate) {
   const auto drive = run_drive("kitti_odometry_a", "kitti_odometry", calibrate);
   const std::string name = std::string("kitti_odometry_a from frame 12") +
                            (calibrate == stereo_slam::Calibration::off ? ", --calibrate off" : "");
-  std::optional<double> end, ate, lost;
+  std::optional<double> end, ate, lost, nees;
   if (drive) {
     std::vector<cairn::PosePair> pairs = stereo_slam::truth_pairs(drive->record);
     pairs.erase(pairs.begin(), pairs.begin() + 12);
@@ -213,11 +248,13 @@ void add_odometry_rows(Scoreboard& board, stereo_slam::Calibration calibrate) {
     end = 100 * E.translation().norm() / cairn::path_distances(pairs).back();
     ate = cairn::absolute_error(pairs)->translation.rmse;
     lost = static_cast<double>(drive->summary.frames_lost);
+    nees = nees_from(drive->record, 12);
   }
   add(board, {.name = name + ": end error over the path", .unit = "%", .must = 0.6, .aim = 0.4}, end,
       drive.has_value());
   add(board, {.name = name + ": ATE", .unit = "m", .must = 0.05, .aim = 0.025}, ate, drive.has_value());
   add(board, {.name = name + ": frames lost", .unit = "", .must = 0}, lost, drive.has_value());
+  add(board, {.name = name + ": NEES of the pose", .unit = "of 6"}, nees, drive.has_value());
   if (calibrate == stereo_slam::Calibration::automatic)
     add(board, {.name = "CPU a pair at 1226 x 370", .unit = "ms", .must = 45, .aim = 24},
         drive ? std::optional(drive->cpu_milliseconds) : std::nullopt, drive.has_value());
@@ -228,10 +265,11 @@ void add_raw_rows(Scoreboard& board, stereo_slam::Calibration calibrate) {
   const auto drive = run_drive("kitti_raw_0926", "kitti_raw", calibrate);
   const std::string name =
       std::string("kitti_raw_0926") + (calibrate == stereo_slam::Calibration::off ? ", --calibrate off" : "");
-  std::optional<double> ate, over25, over50, lost;
+  std::optional<double> ate, over25, over50, lost, nees;
   if (drive) {
     std::vector<cairn::PosePair> pairs = stereo_slam::truth_pairs(drive->record);
     lost = static_cast<double>(drive->summary.frames_lost);
+    nees = nees_from(drive->record, 0);
     for (const auto& [length, to] : {std::pair(25.0, &over25), std::pair(50.0, &over50)})
       if (const auto error = cairn::kitti_error(pairs, {.lengths = {length}, .step = 1}))
         *to = error->overall.translation_percent();
@@ -249,6 +287,29 @@ void add_raw_rows(Scoreboard& board, stereo_slam::Calibration calibrate) {
   add(board, {.name = name + ": mean error over 50 m", .unit = "%", .must = 1.2, .aim = 1.0}, over50,
       drive.has_value());
   add(board, {.name = name + ": frames lost", .unit = "", .must = 0}, lost, drive.has_value());
+  add(board, {.name = name + ": NEES of the pose", .unit = "of 6"}, nees, drive.has_value());
+}
+
+/// Without any truth: the frames of the drive forwards, then backwards.
+void add_return_row(Scoreboard& board) {
+  const auto drive =
+      run_drive("kitti_raw_0926", "kitti_raw", stereo_slam::Calibration::automatic, /*and_back=*/true);
+  std::optional<double> off;
+  if (drive) {
+    const std::vector<stereo_slam::FrameRecord>& frames = drive->record.frames;
+    double path = 0;
+    for (std::size_t i = 1; i < frames.size(); ++i)
+      path += (frames[i].T_world_camera.translation() - frames[i - 1].T_world_camera.translation()).norm();
+    off = 100 *
+          (frames.back().T_world_camera.translation() - frames.front().T_world_camera.translation()).norm() /
+          path;
+  }
+  add(board,
+      {.name = "kitti_raw_0926 forwards then backwards: off the start, over the path",
+       .unit = "%",
+       .must = 0.2,
+       .aim = 0.02},
+      off, drive.has_value());
 }
 
 /// Views near the path of a map that was saved and loaded, each by itself: up to half a metre beside it,
@@ -337,6 +398,8 @@ int main(int argc, char** argv) {
     add_odometry_rows(board, calibrate);
     add_raw_rows(board, calibrate);
   }
+  if (wanted("return")) add_return_row(board);
+  if (wanted("drift")) add_drift_row(board);
   if (wanted("relocalisation")) add_relocalisation_rows(board);
   if (wanted("rate")) add_rate_row(board);
   if (wanted("stores")) stereo_slam_bench::add_store_rows(board);

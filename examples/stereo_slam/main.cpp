@@ -30,6 +30,7 @@
 #include "support/progress.hpp"
 #include "support/rig_file.hpp"
 #include "support/standard_output.hpp"
+#include "there_and_back.hpp"
 
 namespace {
 
@@ -38,6 +39,7 @@ struct Arguments {
   stereo_slam::PipelineOptions pipeline;
   std::filesystem::path out = "stereo_slam_out";
   std::filesystem::path dump, map, save_map, save_rig;
+  bool there_and_back = false;
   std::string store = "multi";
   std::string features = "surf";
   std::string calibrate = "auto";
@@ -109,6 +111,8 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
                  "arena: the right camera turns by so many degrees in 100 frames, unknown to the system")
       ->check(example::number_between(-5, 5))
       ->capture_default_str();
+  app.add_flag("--there-and-back", arguments.there_and_back,
+               "the frames forwards, then backwards: how far from its start does the drive end?");
   app.add_flag("!--no-cache", arguments.dataset.arena.cache, "arena: do not keep rendered images on disk");
   app.add_option("--save", arguments.save_map, "write the map for another run into FILE")->type_name("FILE");
   app.add_option("--save-rig", arguments.save_rig,
@@ -198,6 +202,20 @@ void print_summary(const stereo_slam::RunRecord& record) {
               summary.errors->largest.heading * stereo_slam::degrees);
 }
 
+/// How far a drive there and back ends from where it began.
+void print_return(const stereo_slam::RunRecord& record) {
+  double path = 0;
+  for (std::size_t i = 1; i < record.frames.size(); ++i)
+    path +=
+        (record.frames[i].T_world_camera.translation() - record.frames[i - 1].T_world_camera.translation())
+            .norm();
+  const cairn::SE3 left =
+      record.frames.front().T_world_camera.inverse() * record.frames.back().T_world_camera;
+  std::printf("back at the start: %.4f m off after %.1f m (%.3f %%), turned by %.3f degrees\n",
+              left.translation().norm(), path, path > 0 ? 100 * left.translation().norm() / path : 0.0,
+              left.rotation().angle() * stereo_slam::degrees);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -223,7 +241,8 @@ int main(int argc, char** argv) {
     const auto calibrate = std::ranges::find(stereo_slam::calibration_names, arguments.calibrate);
     arguments.pipeline.calibrate =
         static_cast<stereo_slam::Calibration>(calibrate - stereo_slam::calibration_names.begin());
-    const auto frames = stereo_slam::open_dataset(arguments.dataset);
+    auto frames = stereo_slam::open_dataset(arguments.dataset);
+    if (arguments.there_and_back) frames = stereo_slam::there_and_back(std::move(frames));
     if (!arguments.dump.empty()) {
       stereo_slam::write_kitti_sequence(*frames, arguments.dump);
       return 0;
@@ -244,6 +263,7 @@ int main(int argc, char** argv) {
       example::write_rig(arguments.save_rig, stereo_slam::learned_rig(given, done.record));
     const std::optional<std::string> no_report = stereo_slam::write_outputs(done.record, arguments.out);
     print_summary(done.record);
+    if (arguments.there_and_back && !done.record.ended_early) print_return(done.record);
     if (no_report) std::cout << "no report.html: " << *no_report << '\n';
     std::cout << "results: " << arguments.out.string() << '\n';
     return example::flush_standard_output("stereo_slam") ? done.code : example::exit_mistake;

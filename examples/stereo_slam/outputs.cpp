@@ -58,13 +58,24 @@ example::CalibratedRig learned_rig(const example::CalibratedRig& given, const Ru
   const std::string of = run.dataset + ", " + std::to_string(run.frames.size()) + " frames";
   learned.note = (run.calibration.on ? "learned from " : "as it was given: not corrected with ") + of;
   if (!run.calibration.on) return learned;
-  const cairn::Vector<5>& sigmas = run.calibration.sigmas;
-  const cairn::Matrix<3, 2> turned = cairn::RigCorrection(given.rig).direction_jacobian();
+  const cairn::RigState& sigmas = run.calibration.sigmas;
+  const cairn::RigCorrection correction(given.rig);
+  const cairn::Vector<3> along = correction.direction(cairn::Vector<5>::Zero());
+  const cairn::Matrix<3, 2> turned = correction.direction_jacobian();
   learned.rotation_sigma = sigmas.head<3>();
   learned.translation_sigma = cairn::Vector<3>::Zero();
   for (int i = 0; i < 3; ++i)
     (*learned.translation_sigma)(i) =
-        given.rig.baseline() * std::hypot(turned(i, 0) * sigmas(3), turned(i, 1) * sigmas(4));
+        given.rig.baseline() *
+        std::hypot(turned(i, 0) * sigmas(3), turned(i, 1) * sigmas(4), along(i) * sigmas(5));
+  if (!(sigmas.tail<6>().minCoeff() > 0)) return learned;  // the cameras' own numbers were not estimated
+  const auto of_camera = [](const cairn::PinholeCamera& camera, double focal, double x, double y) {
+    const cairn::PinholeParameters& p = camera.parameters();
+    return std::array<double, 4>{p.fx * focal, p.fy * focal, p.fx * x, p.fy * y};
+  };
+  learned.left.intrinsics = of_camera(run.rig.left, sigmas(6), sigmas(8), sigmas(9));
+  learned.right.intrinsics = of_camera(run.rig.right, std::hypot(sigmas(6), sigmas(7)),
+                                       std::hypot(sigmas(8), sigmas(10)), std::hypot(sigmas(9), sigmas(11)));
   return learned;
 }
 

@@ -64,8 +64,8 @@ struct PipelineOptions {
   StereoMatcherOptions stereo;
 
   Calibration calibrate = Calibration::automatic;
-  /// How far a rig may be off, where it is estimated with the map: what calibrations of recorded rigs are found
-  /// to differ by from one another.
+  /// How far a rig may be off, where it is estimated with the map: what calibrations of recorded rigs are
+  /// found to differ by from one another.
   cairn::RigSigmas rig = {.rotation = 5e-4,
                           .direction = 5e-4,
                           .length = 1e-3,

@@ -17,7 +17,7 @@ namespace stereo_slam {
 namespace {
 
 constexpr const char* kind = "cairnmap";
-constexpr std::uint64_t version = 1;
+constexpr std::uint64_t version = 2;  // 1 had five numbers of the rig
 
 void put(cairn::BinaryWriter& out, const Landmark& landmark) {
   out.put(landmark.sign);

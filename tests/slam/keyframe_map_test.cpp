@@ -106,8 +106,9 @@ Matrix<dynamic> full_covariance(const Scene& s, double first_sigma, const cairn:
   constexpr int of_rig = cairn::rig_numbers, of_point = 6 + of_rig, each = of_point + 3;
   const cairn::StereoRig rig = cairn_test::arena_rig();
   const cairn::RigCorrection correction(rig);
-  const Eigen::Index rig_size = rig_sigma.known() ? 0 : of_rig, poses = 6 * static_cast<Eigen::Index>(s.poses.size()),
-                     n = poses + rig_size, all = n + 3 * static_cast<Eigen::Index>(s.points.size());
+  const Eigen::Index rig_size = rig_sigma.known() ? 0 : of_rig,
+                     poses = 6 * static_cast<Eigen::Index>(s.poses.size()), n = poses + rig_size,
+                     all = n + 3 * static_cast<Eigen::Index>(s.points.size());
   Matrix<dynamic> information = Matrix<dynamic>::Zero(all, all);
   information.topLeftCorner(6, 6).diagonal().setConstant(1 / (first_sigma * first_sigma));
   for (Eigen::Index i = 0; i < rig_size; ++i)
@@ -276,14 +277,14 @@ TEST_SUITE("keyframe_map") {
     const auto rig = map.rig_correction();
     REQUIRE(rig);
     const Matrix<n> of_rig = expected.bottomRightCorner<n, n>();
-    const Matrix<n> half_rig = Matrix<n>(of_rig.llt().matrixL()).triangularView<Eigen::Lower>().solve(
-        rig->covariance);
+    const Matrix<n> half_rig =
+        Matrix<n>(of_rig.llt().matrixL()).triangularView<Eigen::Lower>().solve(rig->covariance);
     const Matrix<n> ratio_rig = Matrix<n>(of_rig.llt().matrixL())
                                     .triangularView<Eigen::Lower>()
                                     .solve(Matrix<n>(half_rig.transpose()));
     CHECK((ratio_rig - Matrix<n>::Identity()).cwiseAbs().maxCoeff() < 0.1);
-    CHECK(of_rig(1, 1) < 0.5 * 1e-6);  // the yaw is seen
-    CHECK(of_rig(7, 7) < 0.1 * 4e-6);  // and the ratio of the focal lengths
+    CHECK(of_rig(1, 1) < 0.5 * 1e-6);                            // the yaw is seen
+    CHECK(of_rig(7, 7) < 0.1 * 4e-6);                            // and the ratio of the focal lengths
     CHECK(of_rig(5, 5) == doctest::Approx(1e-6).epsilon(1e-3));  // the size of the world is not
     const Matrix<dynamic> poses = expected.topLeftCorner(24, 24);
     const Eigen::LLT<Matrix<dynamic>> factor(poses);
@@ -313,6 +314,33 @@ TEST_SUITE("keyframe_map") {
     CHECK(learning.lost == 0);
     CHECK(learning.rms_position < 0.3 * trusting.rms_position);
     CHECK(learning.mean_nees() < 14);
+  }
+
+  TEST_CASE(
+      "keyframe_map: a street whose points are first seen from afar is neither too long nor too short") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    for (const bool with_rig : {false, true}) {
+      CAPTURE(with_rig);
+      KeyframeMapOptions options;
+      if (with_rig) options.rig.rotation = options.rig.direction = 5e-4;
+      constexpr int streets = 5;
+      double along = 0, nees = 0, yaw = 0;  // in standard deviations
+      for (std::uint64_t i = 0; i < streets; ++i) {
+        KeyframeMap map(cairn_test::car_rig(), options);
+        const auto run = cairn_test::run_arena(cairn_test::street_frames(seed + 10 * i, 70), map,
+                                               {.unknown = 0.3, .apart = 3});
+        CHECK(run.lost == 0);
+        along += run.last_error(2) / std::sqrt(run.last_covariance(2, 2)) / streets;
+        nees += run.mean_nees() / streets;
+        if (const auto rig = map.rig_correction())
+          yaw += rig->mean(1) / std::sqrt(rig->covariance(1, 1)) / streets;
+      }
+      CHECK(std::abs(along) < 4 / std::sqrt(1.0 * streets));
+      CHECK(std::abs(yaw) < 4 / std::sqrt(1.0 * streets));
+      CHECK(nees > 2.5);
+      CHECK(nees < 12);
+    }
   }
 
   TEST_CASE("keyframe_map: rigs that are off by what their sigmas say are found, as well as it says") {
@@ -358,7 +386,8 @@ TEST_SUITE("keyframe_map") {
     KeyframeMap exact(cairn_test::arena_rig(), options);
     options.rig = loose_rig;
     KeyframeMap learning(cairn_test::arena_rig(), options);
-    const auto known = cairn_test::run_arena(frames, exact), learned = cairn_test::run_arena(frames, learning);
+    const auto known = cairn_test::run_arena(frames, exact),
+               learned = cairn_test::run_arena(frames, learning);
     CHECK(learned.lost == 0);
     CHECK(learned.rms_position < known.rms_position + 0.005);  // 0.1 % of the arena's radius and a half
     CHECK(learned.mean_nees() < 13);

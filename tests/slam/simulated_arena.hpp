@@ -107,8 +107,54 @@ inline std::vector<ArenaFrame> arena_frames(const ArenaOptions& options) {
   return frames;
 }
 
+inline cairn::StereoRig car_rig() {
+  const cairn::PinholeCamera camera(
+      {.fx = 707, .fy = 707, .cx = 602, .cy = 183, .width = 1226, .height = 370});
+  return {camera, camera, cairn::SE3(cairn::SO3(), cairn::Vector<3>(0.537, 0, 0))};
+}
+
+/// Straight down a street, 0.9 m a frame, between walls and over the ground: most landmarks are first seen
+/// from 20 to 150 times as far as the baseline is long, where noise in the disparity is no longer small.
+inline std::vector<ArenaFrame> street_frames(std::uint64_t seed, int count, double sigma = 0.4) {
+  cairn::Random random(seed, 3);
+  const cairn::StereoRig rig = car_rig();
+  const double length = count + 100.0;
+  std::vector<cairn::Vector<3>> points;
+  for (int i = 0; i < static_cast<int>(15 * length); ++i) {
+    const double along = random.uniform(0, length);
+    if (i % 5 == 0)
+      points.emplace_back(random.uniform(-5, 5), 1.65, along);
+    else
+      points.emplace_back((i % 5 < 3 ? 1 : -1) * random.uniform(5, 12), random.uniform(-5, 1.6), along);
+  }
+  std::vector<ArenaFrame> frames;
+  for (int f = 0; f < count; ++f) {
+    ArenaFrame frame{cairn::SE3(cairn::SO3(), cairn::Vector<3>(0, 0, 0.9 * f)), {}};
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const cairn::Vector<3> p = points[i] - frame.T_world_camera.translation();
+      if (p(2) < 3 || p(2) > 80) continue;
+      const auto pixels = rig.project(p);
+      if (!pixels || !rig.left.contains(pixels->head<2>()) || !rig.right.contains(pixels->tail<2>()) ||
+          random.uniform() > 0.6)
+        continue;
+      cairn::StereoSighting s;
+      s.landmark = static_cast<std::uint32_t>(i);
+      s.sigma = sigma;
+      for (int k = 0; k < 2; ++k) {
+        s.left(k) = (*pixels)(k) + sigma * random.normal();
+        s.right(k) = (*pixels)(2 + k) + sigma * random.normal();
+      }
+      frame.sightings.push_back(s);
+    }
+    frames.push_back(std::move(frame));
+  }
+  return frames;
+}
+
 /// What became of a run.
 struct ArenaRun {
+  cairn::Vector<6> last_error;  ///< of the last pose that was found, its own axes
+  cairn::Matrix<6> last_covariance;
   std::vector<double> nees;
   std::vector<std::size_t> keyframes;  ///< after each frame
   double rms_position = 0;
@@ -158,6 +204,8 @@ inline ArenaRun run_arena(const std::vector<ArenaFrame>& frames, cairn::Keyframe
     pose = here.T_world_camera;
     const auto error = cairn::local(pose, frames[f].T_world_camera);
     run.nees.push_back(cairn::normalised_squared(error, here.covariance).value());
+    run.last_error = error;
+    run.last_covariance = here.covariance;
     squares += error.head<3>().squaredNorm();
     const double share =
         static_cast<double>(unknown.size()) / static_cast<double>(frames[f].sightings.size());

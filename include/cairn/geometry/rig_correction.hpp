@@ -14,8 +14,8 @@
 /// one more, in focal lengths:
 ///   |t| = |t0| exp(l),   f = f0 exp(g [+ h]),   c = c0 + f0 (p [+ q])                      (2)
 /// with what stands in brackets for the right camera. Which of them a scene shows is for an estimator to find
-/// out: yaw w_y and column q_x of the right camera differ by x^2 over the image, a common focal length is seen
-/// where the camera turns. Each has its own sigma beforehand (RigSigmas) for that reason.
+/// out: yaw w_y and column q_x of the right camera differ by x^2 over the image, a common focal length is
+/// seen where the camera turns. Each has its own sigma beforehand (RigSigmas) for that reason.
 #pragma once
 
 #include <array>
@@ -34,8 +34,8 @@ namespace cairn { inline namespace CAIRN_ABI {
 inline constexpr int rig_numbers = 12;
 using RigState = Vector<rig_numbers>;
 inline constexpr std::array<const char*, rig_numbers> rig_number_names{
-    "rotation_x",  "rotation_y", "rotation_z", "baseline_y", "baseline_z",     "baseline_length",
-    "focal_length", "focal_ratio", "centre_x",  "centre_y",   "right_centre_x", "right_centre_y"};
+    "rotation_x",   "rotation_y",  "rotation_z", "baseline_y", "baseline_z",     "baseline_length",
+    "focal_length", "focal_ratio", "centre_x",   "centre_y",   "right_centre_x", "right_centre_y"};
 
 /// How far a rig may be off from what its calibration says: a standard deviation for each kind of number.
 /// All zero: the rig is known exactly.
@@ -88,8 +88,8 @@ public:
   /// (1) and (2). Throws Error where a number is not finite.
   [[nodiscard]] StereoRig rig(const RigState& state) const {
     StereoRig result = rig(loose(state));
-    result.T_left_right = SE3(result.T_left_right.rotation(),
-                              std::exp(state(5)) * result.T_left_right.translation());
+    result.T_left_right =
+        SE3(result.T_left_right.rotation(), std::exp(state(5)) * result.T_left_right.translation());
     const Vector<2> both(state(8), state(9));
     result.left = corrected(nominal_.left, state(6), both);
     result.right = corrected(nominal_.right, state(6) + state(7), both + Vector<2>(state(10), state(11)));

@@ -451,6 +451,7 @@ private:
       entry.landmark = found->second;
       entry.seen = *seen;
       const detail::KeyframeLandmark& one = landmarks_[found->second];
+      entry.geometry = one;
       for (std::size_t k = 0; k < one.count; ++k) {
         std::uint32_t& at = place[one.sightings[k].keyframe];
         if (at == nowhere) {
@@ -467,41 +468,72 @@ private:
   }
 
   /// What each match says at a pose, and how likely that is: the first time under the keyframes as they are,
-  /// then under their solution and with what that leaves uncertain.
+  /// then under their solution and with what that leaves uncertain. The first time also chooses where each
+  /// landmark is linearised: where its list and this sighting together put it. At the list's own place, one
+  /// that noise makes too near would weigh more than one it makes too far, and all motions would come out
+  /// short.
   void judge(const SE3& T, Work& work) {
     const detail::RigView view = view_from(T);
-    const bool with_rig = this->with_rig();
     for (Entry& entry : work.entries) {
-      const detail::KeyframeLandmark& one = landmarks_[entry.landmark];
-      entry.statistics = {};
-      entry.rig = {};
-      const bool seen = with_rig ? entry.seen.add(view, one.x, entry.statistics, entry.rig)
-                                 : entry.seen.add(view, one.x, entry.statistics);
+      const bool seen = look(view, entry);
       entry.chi_squared =
-          seen ? chi_squared(entry, one, work) / pixel_factor_ : std::numeric_limits<double>::infinity();
+          seen ? chi_squared(entry, work) / pixel_factor_ : std::numeric_limits<double>::infinity();
+      if (!work.has_solution && entry.chi_squared < gate_) move_to_posterior(view, entry);
     }
   }
 
-  [[nodiscard]] double chi_squared(Entry& entry, const detail::KeyframeLandmark& one,
-                                   const Work& work) const {
+  /// The statistics of a match, brought to where the list puts the landmark. False where the view cannot see
+  /// it.
+  [[nodiscard]] bool look(const detail::RigView& view, Entry& entry) const {
+    detail::PointStatistics& s = entry.statistics;
+    s = {};
+    const Vector<3>& x = entry.geometry.x;
+    const Vector<3>& d = entry.from_list;
+    if (with_rig()) {
+      entry.rig = {};
+      if (!entry.seen.add(view, x, s, entry.rig)) return false;
+      entry.rig.u -= transposed_product(entry.rig.E, d);
+    } else if (!entry.seen.add(view, x, s)) {
+      return false;
+    }
+    const Vector<3> Ad = product(s.A, d);
+    s.squares += d.dot(Ad) - 2 * s.b.dot(d);
+    s.b -= Ad;
+    return true;
+  }
+
+  void move_to_posterior(const detail::RigView& view, Entry& entry) {
+    const detail::KeyframeLandmark& one = landmarks_[entry.landmark];
+    const Vector<3> at = one.x + product(one.S, detail::WeighedSighting(entry.statistics, one.S).g);
+    const auto keyframes = [this](std::uint32_t k) -> const detail::RigView& { return view_of(k); };
+    const auto from_list = one.linearise(keyframes, at, with_rig(), entry.geometry);
+    if (from_list) entry.from_list = *from_list;
+    if (from_list && look(view, entry)) return;
+    entry.geometry = one;
+    entry.from_list.setZero();
+    static_cast<void>(look(view, entry));
+  }
+
+  [[nodiscard]] double chi_squared(Entry& entry, const Work& work) const {
     const detail::PointStatistics& s = entry.statistics;
+    const detail::LandmarkGeometry& one = entry.geometry;
     entry.at_solution = s;
     if (!work.has_solution) return detail::WeighedSighting(s, one.S).chi_squared;
     Vector<3> moved = Vector<3>::Zero();
     for (std::size_t i = 0; i < one.count; ++i)
       moved += product(one.F[i], moved_with_world(one.x, work.solution.step.data() + 6 * entry.place[i]));
-    if (with_rig()) return chi_squared_with_rig(entry, one, work, moved);
+    if (with_rig()) return chi_squared_with_rig(entry, work, moved);
     const Vector<3> Am = product(s.A, moved);
     entry.at_solution = {s.A, s.b - Am, s.squares - 2 * s.b.dot(moved) + moved.dot(Am)};
     const Matrix<3> uncertain =
-        detail::displacement_covariance(one, entry.places(one), work.solution.covariance);
+        detail::displacement_covariance(one, entry.places(), work.solution.covariance);
     return detail::WeighedSighting(entry.at_solution, one.S + (pose_factor_ / pixel_factor_) * uncertain)
         .chi_squared;
   }
 
-  [[nodiscard]] double chi_squared_with_rig(Entry& entry, const detail::KeyframeLandmark& one,
-                                            const Work& work, Vector<3> moved) const {
+  [[nodiscard]] double chi_squared_with_rig(Entry& entry, const Work& work, Vector<3> moved) const {
     const detail::PointStatistics& s = entry.statistics;
+    const detail::LandmarkGeometry& one = entry.geometry;
     const detail::RigStatistics& rig = entry.rig;
     const RigState c = work.solution.step.segment<rig_numbers>(work.solution.step.size() - 6 - rig_numbers);
     moved += product(one.B, c);
@@ -511,7 +543,7 @@ private:
         s.A, s.b - Am - Ec,
         s.squares - 2 * (s.b.dot(moved) + rig.u.dot(c)) + moved.dot(Am) + 2 * moved.dot(Ec) + c.dot(Dc)};
     const Matrix<3> uncertain =
-        detail::displacement_covariance(one, entry.places(one), work.solution.covariance);
+        detail::displacement_covariance(one, entry.places(), work.solution.covariance);
     return detail::WeighedSighting(entry.at_solution, one.S + (pose_factor_ / pixel_factor_) * uncertain)
         .chi_squared;
   }
@@ -526,11 +558,11 @@ private:
     for (Entry& entry : work.entries) {
       entry.weight = 0;
       if (!(entry.chi_squared < gate_)) continue;
-      const detail::KeyframeLandmark& one = landmarks_[entry.landmark];
+      const detail::LandmarkGeometry& one = entry.geometry;
       entry.weight = robust_weight(options_.loss, options_.loss_scale, entry.chi_squared);
       const detail::WeighedSighting weighed(entry.statistics, one.S);
-      equations_.add(one, entry.places(one), weighed.N, weighed.g, entry.weight);
-      if (with_rig) equations_.add_rig(one, entry.places(one), weighed, entry.rig, entry.weight);
+      equations_.add(one, entry.places(), weighed.N, weighed.g, entry.weight);
+      if (with_rig) equations_.add_rig(one, entry.places(), weighed, entry.rig, entry.weight);
       weights += entry.weight;
       ++agree;
     }
@@ -561,7 +593,7 @@ private:
       if (frame_ - one.last_seen > static_cast<std::uint64_t>(options_.visit_gap)) one.of_visit = 0;
       one.last_seen = frame_;
     }
-    result.score_variance = detail::score_variance(work, landmarks_, equations_.camera(), rig_.left);
+    result.score_variance = detail::score_variance(work, equations_.camera(), rig_.left);
     result.inlier_count = sizes.size();
     result.median_chi_squared = median(std::move(sizes));
     result.viewpoint_change = median(std::move(changes));
@@ -665,7 +697,7 @@ private:
   bool estimates_rig_ = false;
   double gate_, efficiency_;
   JointGaussian<WorldPose, RigState> poses_;
-  BlockId<RigState> rig_block_;     // where the rig is estimated
+  BlockId<RigState> rig_block_;      // where the rig is estimated
   std::vector<Keyframe> keyframes_;  // all that ever were
   std::vector<detail::KeyframeLandmark> landmarks_;
   std::unordered_map<std::uint32_t, std::size_t> place_;

@@ -31,13 +31,15 @@ struct FrameEntry {
   std::size_t landmark = 0;                           ///< place among the map's
   std::array<std::uint32_t, most_sightings> place{};  ///< of its keyframes among those in play
   WhitenedSighting seen;
+  LandmarkGeometry geometry;                ///< about where this sighting and the list put the landmark
+  Vector<3> from_list = Vector<3>::Zero();  ///< from there to where the list alone puts it
   PointStatistics statistics, at_solution;
   RigStatistics rig;
   double chi_squared = 0, weight = 0;  ///< in units of the pixels' factor
 
   /// Numbers, among the keyframes in play, of those of its landmark's sightings.
-  [[nodiscard]] std::span<const std::uint32_t> places(const KeyframeLandmark& one) const noexcept {
-    return std::span(place).first(one.count);
+  [[nodiscard]] std::span<const std::uint32_t> places() const noexcept {
+    return std::span(place).first(geometry.count);
   }
 };
 
@@ -56,8 +58,8 @@ struct FrameWork {
 /// models", Biometrika 73, 1986) over the one that counts with independent matches: with the score s_c =
 /// sum J^T W r of the matches of a cell of the image and A = sum J^T W J, the mean of s_c^T A^-1 s_c summed
 /// over the cells is 6. The pose has taken its share out of the scores: 1 in as many as there are cells.
-[[nodiscard]] inline double score_variance(const FrameWork& work, std::span<const KeyframeLandmark> landmarks,
-                                           const Matrix<6>& camera, const PinholeCamera& left) {
+[[nodiscard]] inline double score_variance(const FrameWork& work, const Matrix<6>& camera,
+                                           const PinholeCamera& left) {
   constexpr int columns = 4, rows = 3;
   std::array<Vector<6>, static_cast<std::size_t>(columns * rows)> scores;
   scores.fill(Vector<6>::Zero());
@@ -65,7 +67,7 @@ struct FrameWork {
                height = left.height() > 0 ? left.height() : 2 * left.cy() + 1;
   for (const FrameEntry& entry : work.entries) {
     if (!(entry.weight > 0)) continue;
-    const KeyframeLandmark& one = landmarks[entry.landmark];
+    const LandmarkGeometry& one = entry.geometry;
     const Vector<3> g = entry.weight * WeighedSighting(entry.at_solution, one.S).g;
     const Vector<2>& pixel = work.matches[entry.match].left;
     const double u = pixel(0) / width, v = pixel(1) / height;

@@ -50,7 +50,7 @@ public:
   }
 
   /// (2) for one match: place[i] is the number here of the keyframe of sighting i.
-  void add(const KeyframeLandmark& landmark, std::span<const std::uint32_t> place, const Matrix<3>& N,
+  void add(const LandmarkGeometry& landmark, std::span<const std::uint32_t> place, const Matrix<3>& N,
            const Vector<3>& g, double weight) {
     const std::size_t count = landmark.count;
     const std::uint32_t camera = static_cast<std::uint32_t>(size_ - 1);
@@ -70,17 +70,18 @@ public:
   }
 
   /// What the match says of the rig, besides.
-  void add_rig(const KeyframeLandmark& landmark, std::span<const std::uint32_t> place,
+  void add_rig(const LandmarkGeometry& landmark, std::span<const std::uint32_t> place,
                const WeighedSighting& seen, const RigStatistics& rig, double weight) {
     const Matrix<3, rig_numbers> GE = product(seen.G, rig.E),
-                       K = product(seen.N, landmark.B) + GE;  // J^T W (J B + J_c)
+                                 K = product(seen.N, landmark.B) + GE;  // J^T W (J B + J_c)
     for (std::size_t i = 0; i < landmark.count; ++i)
       add_rig_block(place[i], weight * transposed_product(landmark.F[i], K), landmark.x);
     add_rig_block(static_cast<std::uint32_t>(size_ - 1), -weight * K, landmark.x);
     const Matrix<3, rig_numbers> SE = product(landmark.S, rig.E);
     const Matrix<rig_numbers> direct = rig.D - transposed_product(SE, GE);
-    rig_information_ += weight * symmetrised(Matrix<rig_numbers>(transposed_product(landmark.B, K) +
-                                                       transposed_product(GE, landmark.B) + direct));
+    rig_information_ +=
+        weight * symmetrised(Matrix<rig_numbers>(transposed_product(landmark.B, K) +
+                                                 transposed_product(GE, landmark.B) + direct));
     rig_gradient_ +=
         weight * (transposed_product(landmark.B, seen.g) + rig.u - transposed_product(SE, seen.g));
   }
@@ -196,7 +197,7 @@ private:
 
 /// Covariance of d of (1) by the solution's: how far landmark and camera may still be from where they are
 /// predicted.
-[[nodiscard]] inline Matrix<3> displacement_covariance(const KeyframeLandmark& landmark,
+[[nodiscard]] inline Matrix<3> displacement_covariance(const LandmarkGeometry& landmark,
                                                        std::span<const std::uint32_t> place,
                                                        const Matrix<dynamic, dynamic>& covariance) {
   const std::size_t n = landmark.count + 1;

@@ -13,6 +13,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
@@ -31,20 +32,24 @@ struct RecordedSighting {
   WhitenedSighting whitened;
 };
 
-struct KeyframeLandmark {
-  std::uint32_t id = 0;
-  std::array<RecordedSighting, most_sightings> sightings;
-  std::size_t count = 0;
-  std::size_t of_visit = 0;         ///< sightings recorded in the present visit
-  std::uint64_t last_seen = 0;      ///< frame
-  bool barred = false;              ///< a sighting that P knows of was struck: no more may be recorded
-  std::uint64_t epoch = 0;          ///< of the map when the following were computed
-  Vector<3> x = Vector<3>::Zero();  ///< world [m]
-  Matrix<3> S = Matrix<3>::Zero();  ///< covariance of x if the keyframes were known [m^2]
+/// What a list says of its landmark, to first order about the point x.
+struct LandmarkGeometry {
+  Vector<3> x = Vector<3>::Zero();          ///< world [m]
+  Matrix<3> S = Matrix<3>::Zero();          ///< its covariance if the keyframes were known [m^2]
   std::array<Matrix<3>, most_sightings> F;  ///< (1)
   Matrix<3, rig_numbers> B =
       Matrix<3, rig_numbers>::Zero();  ///< d x / d the rig's numbers, where those are estimated
-  double chi_squared = 0;                   ///< of the list, 4 count - 3 degrees of freedom
+  std::size_t count = 0;               ///< sightings in the list
+};
+
+struct KeyframeLandmark : LandmarkGeometry {
+  std::uint32_t id = 0;
+  std::array<RecordedSighting, most_sightings> sightings;
+  std::size_t of_visit = 0;     ///< sightings recorded in the present visit
+  std::uint64_t last_seen = 0;  ///< frame
+  bool barred = false;          ///< a sighting that P knows of was struck: no more may be recorded
+  std::uint64_t epoch = 0;      ///< of the map when the geometry was computed
+  double chi_squared = 0;       ///< of the list, 4 count - 3 degrees of freedom
 
   /// x, S, F and, `with_rig`, B from the list: Gauss-Newton from the present x. view(keyframe) is where that
   /// one stands. False where a sighting cannot be of this point.
@@ -73,6 +78,34 @@ struct KeyframeLandmark {
       return length < 1 && (!with_rig || solve_rig(view));
     }
     return false;
+  }
+
+  /// The geometry about another point `at`, and how far from there the list puts the landmark. Nothing where
+  /// a sighting cannot be of that point.
+  template <class View>
+  [[nodiscard]] std::optional<Vector<3>> linearise(const View& view, const Vector<3>& at, bool with_rig,
+                                                   LandmarkGeometry& result) const {
+    PointStatistics all;
+    RigStatistics rig;
+    std::array<Matrix<3>, most_sightings> A;
+    for (std::size_t i = 0; i < count; ++i) {
+      const RecordedSighting& s = sightings[i];
+      PointStatistics seen;
+      const RigView& from = view(s.keyframe);
+      if (!(with_rig ? s.whitened.add(from, at, seen, rig) : s.whitened.add(from, at, seen)))
+        return std::nullopt;
+      A[i] = seen.A;
+      all.A += seen.A;
+      all.b += seen.b;
+    }
+    const Cholesky<3> factor(all.A);
+    if (!factor.good() || !(factor.least_share() > 1e-12)) return std::nullopt;
+    result.x = at;
+    result.S = factor.inverse();
+    result.count = count;
+    for (std::size_t i = 0; i < count; ++i) result.F[i] = product(result.S, A[i]);
+    if (with_rig) result.B = -product(result.S, rig.E);
+    return factor.solve(all.b);
   }
 
   /// B = -S sum_k E_k: where the sightings' rig turns by c, their point moves by B c.

@@ -86,7 +86,8 @@ public:
 
   /// Adds this camera's part for a point at p in its frame, R from world axes. False beside the view.
   [[nodiscard]] bool add(const Matrix<3>& R, const Vector<3>& p, double nearest, PointStatistics& s,
-                         const RigDerivatives* by_rig = nullptr, RigStatistics* rig = nullptr) const noexcept {
+                         const RigDerivatives* by_rig = nullptr,
+                         RigStatistics* rig = nullptr) const noexcept {
     constexpr double widest = 10;  // tangent of 84 degrees
     const double reach = widest * p(2);
     if (!(p(2) > nearest && p(0) < reach && -p(0) < reach && p(1) < reach && -p(1) < reach)) return false;
@@ -115,13 +116,14 @@ private:
     double of_rig[rig_numbers] = {};
     int first = RigDerivatives::of_point;
     const double centre = by.nominal_focal(i) * inverse_sigma_;
-    of_rig[6] = from_centre_(i);
+    const double from_centre = from_centre_(i) - r;  // as predicted: the noise of r may not see itself
+    of_rig[6] = from_centre;
     of_rig[8 + i] = centre;
     if (by.right) {
       first = 0;
       for (int c = 0; c < RigDerivatives::of_point; ++c)
         of_rig[c] = j(0) * by.point(0, c) + j(1) * by.point(1, c) + j(2) * by.point(2, c);
-      of_rig[7] = from_centre_(i);
+      of_rig[7] = from_centre;
       of_rig[10 + i] = centre;
     }
     for (int c = first; c < rig_numbers; ++c) {
