@@ -209,7 +209,7 @@ private:
       static_cast<void>(detail::sigma_rows(
           belief.mean, root, [&](const X& x) -> Z { return sensor.predict(x); }, c2, beta_minus_alpha2(),
           array));
-      if constexpr (!fixed) update = detail::ArrayUpdate<n, M, S>(ns, ms);
+      update.make_room(ns, ms);
       Vector<M, S> y = in.residual;
       detail::Room<S, detail::room_by_points(n, M)> numbers(detail::room_by_points(ns, ms));
       return detail::update_by_points<S>(array, detail::view(root), detail::view(r),

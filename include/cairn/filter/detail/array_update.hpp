@@ -65,12 +65,14 @@ struct ArrayUpdate : ArrayVerdict<S> {
   Matrix<N, M, S> white;   ///< K root_s = P H^T root_s^-T
   Vector<N, S> step;
 
-  ArrayUpdate() = default;
-  ArrayUpdate(int n, int m)
-      : root_s(room<M, M, S>(m, m)),
-        root(room<N, N, S>(n, n)),
-        white(room<N, M, S>(n, m)),
-        step(room<N, 1, S>(n, 1)) {}
+  void make_room([[maybe_unused]] int n, [[maybe_unused]] int m) {
+    if constexpr (N == dynamic || M == dynamic) {
+      root_s.resize(m, m);
+      root.resize(n, n);
+      white.resize(n, m);
+      step.resize(n);
+    }
+  }
 };
 
 /// Triangularises `array`, which is used up, and fills the parts. `y` is the residual, whitened on return.
@@ -131,7 +133,8 @@ enum class Wanted { always, rarely };
 template <int N, int M, class S, Wanted When = Wanted::always, class Array>
 [[nodiscard]] ArrayUpdate<N, M, S> update_by_array(Array& array, const Vector<M, S>& residual, int n) {
   const int m = static_cast<int>(residual.size());
-  ArrayUpdate<N, M, S> out(n, m);
+  ArrayUpdate<N, M, S> out;
+  out.make_room(n, m);
   Vector<M, S> y = residual;
   ArrayVerdict<S>& verdict = out;
   if constexpr (When == Wanted::always)
@@ -266,7 +269,7 @@ template <int N, int M, class S>
                                      const Matrix<M, M, S>& r, const Vector<M, S>& residual,
                                      ArrayUpdate<N, M, S>& update) {
   const int n = static_cast<int>(prior.rows()), m = static_cast<int>(residual.size());
-  if constexpr (N == dynamic || M == dynamic) update = ArrayUpdate<N, M, S>(n, m);
+  update.make_room(n, m);
   Vector<M, S> y = residual;
   Room<S, room_for_roots(N, M)> numbers(room_for_roots(n, m));
   return update_by_roots<S>(view(prior), view(h), view(r), view(update.root_s), view(update.root),
