@@ -18,8 +18,9 @@ inline bool finite(const cairn::SE2& pose) {
   return std::isfinite(pose.x()) && std::isfinite(pose.y()) && std::isfinite(pose.angle());
 }
 
-/// Frames in the order of time, each with finite sightings and the motion since the one before.
-inline void check_landmark_log(const fastslam::LandmarkLog& log) {
+/// Frames in the order of time, each with finite sightings and the motion since the one before. Noise drawn
+/// by a simulation may make a range negative: `least_range`.
+inline void check_landmark_log(const fastslam::LandmarkLog& log, double least_range = 0) {
   expect(!log.frames.empty(), "a log has frames");
   double before = -INFINITY;
   for (const fastslam::Frame& frame : log.frames) {
@@ -28,7 +29,8 @@ inline void check_landmark_log(const fastslam::LandmarkLog& log) {
     expect(finite(frame.moved.mean) && frame.moved.covariance.allFinite(), "motions are finite");
     for (int i = 0; i < 3; ++i) expect(frame.moved.covariance(i, i) >= 0, "variances are not negative");
     for (const auto& sighting : frame.seen) {
-      expect(std::isfinite(sighting.z.part<0>()(0)) && sighting.z.part<0>()(0) >= 0, "ranges are distances");
+      const double range = sighting.z.part<0>()(0);
+      expect(std::isfinite(range) && range >= least_range, "ranges are distances");
       expect(std::isfinite(sighting.z.part<1>().angle()), "bearings are finite");
       expect(!sighting.identity || *sighting.identity < fastslam::Map::most_identity, "identities are small");
     }
