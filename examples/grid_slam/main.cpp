@@ -133,6 +133,8 @@ void print(const Results& r, const std::filesystem::path& out) {
     std::cout << (i == 0 ? "began at " : "the second best place: ") << p.x() << " " << p.y() << " m, heading "
               << p.angle() << " rad, share " << r.places[i].share << "\n";
   }
+  if (!r.places.empty() && r.places.front().share < 0.9)
+    std::cout << "places look alike to the first scan: a smaller --window decides\n";
   const auto line = [](const char* name, const std::optional<cairn::RelationError>& e) {
     if (e && e->count > 0)
       std::cout << "relations, " << name << e->mean << " m, " << e->mean_angle * 57.29577951308232

@@ -14,7 +14,6 @@
 #include <cairn/core/parallel.hpp>
 #include <cairn/core/random.hpp>
 #include <cairn/core/statistics.hpp>
-#include <cairn/io/text.hpp>
 #include <cairn/scan/correlative.hpp>
 #include <cairn/scan/match.hpp>
 
@@ -177,8 +176,7 @@ Mapper Mapper::localiser(const std::filesystem::path& path, const MapRequest& wa
 }
 
 cairn::Gaussian<SE2> Mapper::place_in_window(const cairn::StampedScan& scan) {
-  constexpr double view = 12;         // [m]: farther points say little more and cost much
-  constexpr double sure_share = 0.9;  // of the best place, from which on it is taken
+  constexpr double view = 12;  // [m]: farther points say little more and cost much
   const double x = 0.5 * (window_->left + window_->right), y = 0.5 * (window_->bottom + window_->top);
   const double half_x = window_->right - x, half_y = window_->top - y;
   std::vector<ScanPoint> near;
@@ -209,17 +207,6 @@ cairn::Gaussian<SE2> Mapper::place_in_window(const cairn::StampedScan& scan) {
   const std::size_t best = static_cast<std::size_t>(
       std::ranges::max_element(places_, {}, &PossiblePlace::share) - places_.begin());
   std::ranges::stable_sort(places_, std::ranges::greater{}, &PossiblePlace::share);
-  if (places_.front().share < sure_share) {
-    std::string which;
-    for (const PossiblePlace& p : places_)
-      if (p.share > 0.01)
-        which += (which.empty() ? "" : "; ") + cairn::shortest(std::round(100 * p.pose.x()) / 100) + " " +
-                 cairn::shortest(std::round(100 * p.pose.y()) / 100) + " m, heading " +
-                 cairn::shortest(std::round(100 * p.pose.angle()) / 100) + " rad (" +
-                 std::to_string(std::lrint(100 * p.share)) + " %)";
-    cairn::raise("grid_slam: several places in the window explain the first scan: " + which +
-                 "; give a window with one of them");
-  }
   return starts[best];
 }
 

@@ -114,7 +114,7 @@ public:
   /// A mapper that leaves the saved map of the best particle as it is. It begins where the saved one stood,
   /// or, with a window, at the place in it, of any heading, that explains the first scan best. Throws as
   /// loaded(), and where the window has no part of the map in it. The first scan is refused where no place
-  /// explains it, and where two do so nearly alike, naming them.
+  /// explains it; places() says what looks like the place taken.
   [[nodiscard]] static Mapper localiser(const std::filesystem::path& path, const MapRequest& wanted = {},
                                         const std::optional<PlaceWindow>& window = std::nullopt);
   /// Writes all that the mapper is, or, throwing cairn::Error, leaves the file as it was.

@@ -105,7 +105,7 @@ TEST_SUITE("grid_slam/map_file") {
     CHECK((localiser.trajectory(true).front().pose.translation() - expected.translation()).norm() < 0.05);
   }
 
-  TEST_CASE("map_file: a place that looks like another is not chosen, and both are named") {
+  TEST_CASE("map_file: of a place that looks like another both are named, with their shares") {
     // A room of 6 m x 4 m: turned by half a turn about its middle it is the same.
     const auto seen_from = [](const SE2& pose) {
       cairn::StampedScan scan;
@@ -125,18 +125,16 @@ TEST_SUITE("grid_slam/map_file") {
     mapper.save(folder / "map");
     const cairn::StampedScan first = seen_from(SE2(0.8, 0.5, 0.4));
     Mapper undecided = Mapper::localiser(folder / "map", {}, PlaceWindow{-3, -2, 3, 2});
-    const std::string why = cairn_test::message_of([&] { undecided.add(first); });
-    CHECK(why.find("several places") != std::string::npos);
+    undecided.add(first);
     REQUIRE(undecided.places().size() >= 2);
     const SE2 one = undecided.places()[0].pose, other = undecided.places()[1].pose;
     CHECK((one.translation() + other.translation()).norm() < 0.1);
     CHECK(std::abs(cairn::wrapped(one.angle() - other.angle())) > 3);
     CHECK(undecided.places()[0].share < 0.9);
-    CHECK(why.find("heading") != why.rfind("heading"));
+    CHECK(undecided.places()[1].share > 0.1);
     Mapper decided = Mapper::localiser(folder / "map", {}, PlaceWindow{0.1, -2, 3, 2});
     decided.add(first);
     REQUIRE(!decided.places().empty());
-    CHECK(decided.places().front().share > 0.9);
     CHECK((decided.places().front().pose.translation() - cairn::Vector<2>(0.8, 0.5)).norm() < 0.05);
   }
 
