@@ -137,7 +137,7 @@ private:
   /// kernel bridges; the mean itself where the motion is no wider.
   [[nodiscard]] cairn::SE2 best_start(const OccupancyMap& map, Looked& looked,
                                       const cairn::Gaussian<cairn::SE2>& motion) const {
-    constexpr double reach = 0.2, turn = 0.1;  // [m], [rad] between neighbours
+    constexpr double reach = 0.15, turn = 0.08;  // [m], [rad] between neighbours
     const auto count = [](double sigma, double spacing) { return static_cast<int>(2 * sigma / spacing); };
     const int nx = count(std::sqrt(motion.covariance(0, 0)), reach);
     const int ny = count(std::sqrt(motion.covariance(1, 1)), reach);
@@ -145,7 +145,7 @@ private:
     if (nx + ny + na == 0) return motion.mean;
     cairn::EndPointModel wide = map.model;
     wide.sigma *= coarse.empty() ? 1 : coarse.front().width;
-    const std::vector<cairn::ScanPoint> few = cairn::thinned(looked.few, 4 * thinning);
+    const std::vector<cairn::ScanPoint> few = cairn::thinned(looked.few, 2 * thinning);
     cairn::SE2 best = motion.mean;
     double most = cairn::log_likelihood(map.grid, looked.field, few, best, wide);
     for (int a = -na; a <= na; ++a)
