@@ -122,11 +122,19 @@ Results map_occupancy(const Options& options, const Input& input, std::optional<
   prepare_folder(options.out);
   const example::Interruption interruption;
   example::Progress progress(std::clog, "scans", input.log.scans.size());
-  return run(*mapper, input.log, input.relations, watched(progress));
+  constexpr std::size_t frames = 48;  // of the report's film
+  return run(*mapper, input.log, input.relations, watched(progress), frames);
 }
 
 void print(const Results& r, const std::filesystem::path& out) {
   std::cout << r.steps.size() << " of " << r.scans << " scans processed, " << r.loops.size() << " loops\n";
+  for (std::size_t i = 0; i < r.places.size() && i < 2; ++i) {
+    const cairn::SE2& p = r.places[i].pose;
+    std::cout << (i == 0 ? "began at " : "the second best place: ") << p.x() << " " << p.y() << " m, heading "
+              << p.angle() << " rad, share " << r.places[i].share << "\n";
+  }
+  if (!r.places.empty() && r.places.front().share < 0.9)
+    std::cout << "places look alike to the first scan: a smaller --window decides\n";
   const auto line = [](const char* name, const std::optional<cairn::RelationError>& e) {
     if (e && e->count > 0)
       std::cout << "relations, " << name << e->mean << " m, " << e->mean_angle * 57.29577951308232

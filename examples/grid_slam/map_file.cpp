@@ -56,16 +56,12 @@ void parts(Archive& archive, OccupancyCell& c) {
   archive(c.visits, c.hits, c.mean_x, c.mean_y);
 }
 template <class Archive>
-void parts(Archive& archive, NearestObstacle& o) {
-  archive(o.dx, o.dy, o.normal_x, o.normal_y);
-}
-template <class Archive>
 void parts(Archive& archive, TileAddress& a) {
   archive(a.column, a.row);
 }
 template <class Archive>
 void parts(Archive& archive, EndPointModel& m) {
-  archive(m.sigma, m.outliers, m.independence);
+  archive(m.sigma, m.outliers, m.unknown, m.independence);
 }
 
 }  // namespace CAIRN_ABI
@@ -85,7 +81,7 @@ void parts(Archive& archive, Loop& l) {
 namespace {
 
 constexpr std::string_view kind = "cairngrd";
-constexpr std::uint64_t version = 1;
+constexpr std::uint64_t version = 2;
 
 /// Grids that share tiles: every tile once, and for each grid the numbers of its own.
 template <class Cell>
@@ -121,7 +117,11 @@ struct TileStore {
     for (std::size_t i = 0; i < tiles.size(); ++i) {
       if (tiles[i].cells.size() != cairn::tile_cells) reader.refuse("a tile of the map has another size");
       if (!std::ranges::all_of(tiles[i].cells, possible)) reader.refuse("a cell has more hits than visits");
-      std::ranges::copy(tiles[i].cells, single[i].writable_tile(tiles[i].address).begin());
+      auto& tile = single[i].writable_tile(tiles[i].address);
+      for (std::size_t k = 0; k < tiles[i].cells.size(); ++k) {
+        tile[k] = tiles[i].cells[k];
+        tile.mark(k);
+      }
     }
     for (std::size_t g = 0; g < all.size(); ++g)
       for (const std::uint32_t number : of_grid[g]) {
@@ -220,14 +220,10 @@ void Mapper::save(const std::filesystem::path& path) const {
   MapperOptions& options = copy.options_;
   cairn::PathsRecord<cairn::SE2> record = belief_->record();
   TileStore<cairn::OccupancyCell> cells;
-  TileStore<cairn::NearestObstacle> fields;
-  for (std::size_t i = 0; i < belief_->size(); ++i) {
-    cells.add((*belief_)[i].map.grid.cells());
-    fields.add((*belief_)[i].map.grid.field().tiles());
-  }
+  for (std::size_t i = 0; i < belief_->size(); ++i) cells.add((*belief_)[i].map.grid.cells());
   Writer writer;
   writer(options.cell_size, options.field_radius, options.model, options.particles, options.seed, record,
-         cells, fields);
+         cells);
   plain_parts(writer, copy);
   cairn::write_file_atomically(path, writer.file(kind, version));
 }
@@ -247,9 +243,8 @@ Mapper Mapper::loaded(Reader& reader, const MapRequest& wanted) {
   MapperOptions options;
   cairn::PathsRecord<cairn::SE2> record;
   TileStore<cairn::OccupancyCell> cells;
-  TileStore<cairn::NearestObstacle> fields;
   reader(options.cell_size, options.field_radius, options.model, options.particles, options.seed, record,
-         cells, fields);
+         cells);
   if (wanted.cell_size && *wanted.cell_size != options.cell_size)
     reader.refuse("expected cells of " + cairn::shortest(*wanted.cell_size) +
                   " m, found a map with cells of " + cairn::shortest(options.cell_size) + " m");
@@ -265,13 +260,11 @@ Mapper Mapper::loaded(Reader& reader, const MapRequest& wanted) {
   mapper.expect_sound(reader);
   expect_paths(reader, record, mapper.travelled_.size());
   auto cell_grids = cells.grids(reader);
-  auto field_grids = fields.grids(reader);
-  if (cell_grids.size() != field_grids.size()) reader.refuse("the map has cells without a distance field");
   std::vector<OccupancyMap> maps;
   for (std::size_t i = 0; i < cell_grids.size(); ++i)
-    maps.push_back({cairn::OccupancyGrid({{options.cell_size, 0, 0}, options.field_radius},
-                                         std::move(cell_grids[i]), std::move(field_grids[i])),
-                    options.model});
+    maps.push_back(
+        {cairn::OccupancyGrid({{options.cell_size, 0, 0}, options.field_radius}, std::move(cell_grids[i])),
+         options.model});
   mapper.belief_.emplace(record, std::move(maps));
   return mapper;
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <string>
 #include <utility>
@@ -12,6 +13,7 @@
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/parallel.hpp>
 #include <cairn/core/random.hpp>
+#include <cairn/core/statistics.hpp>
 #include <cairn/scan/correlative.hpp>
 #include <cairn/scan/match.hpp>
 
@@ -66,14 +68,31 @@ cairn::ScoreGrid scores_around(const cairn::OccupancyGrid& grid, double x, doubl
   const int side = static_cast<int>(2 * reach / geometry.cell_size) + 1;
   cairn::ScoreGrid scores(geometry, low, side, side);
   constexpr double sigma = 0.1;  // [m], about the lattice's own coarseness
-  for (int row = 0; row < side; ++row)
-    for (int column = 0; column < side; ++column) {
-      const auto& o = grid.field().read({low.column + column, low.row + row});
-      if (!o.found()) continue;
-      const double unit = geometry.cell_size / cairn::NearestObstacle::steps;
-      const double squared = unit * unit * (o.dx * o.dx + o.dy * o.dy);
-      scores(column, row) = static_cast<std::uint8_t>(255 * std::exp(-0.5 * squared / (sigma * sigma)));
+  const int radius = static_cast<int>(std::ceil(3 * sigma / geometry.cell_size));
+  constexpr int fineness = 16;  // of squared distances [1/cells^2]
+  std::vector<std::uint8_t> worth;
+  for (int k = 0; k <= fineness * 9 * radius * radius; ++k) {
+    const double squared = geometry.cell_size * geometry.cell_size * k / fineness;
+    worth.push_back(squared > 9 * sigma * sigma
+                        ? std::uint8_t{0}
+                        : static_cast<std::uint8_t>(255 * std::exp(-0.5 * squared / (sigma * sigma))));
+  }
+  grid.cells().for_each_tile([&](cairn::TileAddress address, const auto& tile) {
+    const cairn::CellAddress corner = cairn::corner_of(address);
+    for (int i = 0; i < cairn::tile_cells; ++i) {
+      const cairn::OccupancyCell& cell = tile[static_cast<std::size_t>(i)];
+      if (!cell.is_obstacle()) continue;
+      const int column = corner.column + i % cairn::tile_side - low.column,
+                row = corner.row + i / cairn::tile_side - low.row;
+      for (int r = std::max(0, row - radius); r <= std::min(side - 1, row + radius); ++r)
+        for (int c = std::max(0, column - radius); c <= std::min(side - 1, column + radius); ++c) {
+          const float dx = static_cast<float>(column - c) + cell.point_x() - 0.5F;
+          const float dy = static_cast<float>(row - r) + cell.point_y() - 0.5F;
+          const auto k = static_cast<std::size_t>(fineness * (dx * dx + dy * dy));
+          scores(c, r) = std::max(scores(c, r), worth[k]);
+        }
     }
+  });
   return scores;
 }
 
@@ -156,7 +175,7 @@ Mapper Mapper::localiser(const std::filesystem::path& path, const MapRequest& wa
   return mapper;
 }
 
-cairn::Gaussian<SE2> Mapper::place_in_window(const cairn::StampedScan& scan) const {
+cairn::Gaussian<SE2> Mapper::place_in_window(const cairn::StampedScan& scan) {
   constexpr double view = 12;  // [m]: farther points say little more and cost much
   const double x = 0.5 * (window_->left + window_->right), y = 0.5 * (window_->bottom + window_->top);
   const double half_x = window_->right - x, half_y = window_->top - y;
@@ -165,16 +184,30 @@ cairn::Gaussian<SE2> Mapper::place_in_window(const cairn::StampedScan& scan) con
     if (std::hypot(p.x, p.y) < view) near.push_back(p);
   const cairn::OccupancyGrid& grid = frozen_->grid;
   const cairn::CorrelativeSearch search(scores_around(grid, x, y, std::max(half_x, half_y) + view), 6);
-  const auto found = search.find(cairn::thinned(near, 0.2), SE2(x, y, 0), {half_x, half_y, std::numbers::pi},
-                                 options_.loops.enough_score);
-  if (!found) cairn::raise("grid_slam: no place in the window explains the first scan");
-  const cairn::MatchOptions fine{.model = options_.model};
-  const auto result = cairn::match(grid, near, found->pose, found->pose, Matrix<3>::Zero(), fine);
+  const auto found =
+      search.find_places(cairn::thinned(near, 0.2), SE2(x, y, 0), {half_x, half_y, std::numbers::pi}, 4, {},
+                         options_.loops.enough_score);
+  if (found.empty()) cairn::raise("grid_slam: no place in the window explains the first scan");
   const Matrix<3> floor = Vector<3>(0.0025, 0.0025, 0.0004).asDiagonal();
-  const cairn::Cholesky<3> information(result.information);
-  if (result.status == cairn::MatchStatus::few_inliers || !information.good())
-    return {found->pose, 4 * floor};
-  return {result.pose, information.inverse() + floor};
+  std::vector<cairn::Gaussian<SE2>> starts;
+  std::vector<double> evidence;
+  for (const cairn::CorrelativeMatch& place : found) {
+    const auto result =
+        cairn::match(grid, near, place.pose, place.pose, Matrix<3>::Zero(), {.model = options_.model});
+    const cairn::Cholesky<3> information(result.information);
+    if (result.status == cairn::MatchStatus::few_inliers || !information.good())
+      starts.push_back({place.pose, 4 * floor});
+    else
+      starts.push_back({result.pose, information.inverse() + floor});
+    evidence.push_back(options_.evidence_share * result.log_likelihood);
+  }
+  const double total = cairn::log_sum_exp(evidence);
+  for (std::size_t i = 0; i < starts.size(); ++i)
+    places_.push_back({starts[i].mean, std::exp(evidence[i] - total)});
+  const std::size_t best = static_cast<std::size_t>(
+      std::ranges::max_element(places_, {}, &PossiblePlace::share) - places_.begin());
+  std::ranges::stable_sort(places_, std::ranges::greater{}, &PossiblePlace::share);
+  return starts[best];
 }
 
 void Mapper::accumulate(const SE2& moved) {
@@ -217,6 +250,7 @@ void Mapper::process(const cairn::StampedScan& scan) {
     result.modes.back().motion.covariance = slipped;
     return result;
   };
+  points_.push_back(cairn::scan_points(scan.scan));
   FromMatch proposal;
   proposal.widened = options_.widened;
   const cairn::ConditionalFilter filter{.resample_below = options_.resample_below,
@@ -224,7 +258,6 @@ void Mapper::process(const cairn::StampedScan& scan) {
                                         .insert = !frozen_.has_value(),
                                         .seed = options_.seed,
                                         .threads = options_.threads};
-  points_.push_back(cairn::scan_points(scan.scan));
   const cairn::MappingStep step = filter.step(*belief_, motion, proposal, points_.back());
   if (!step.accepted())
     cairn::raise("grid_slam: scan " + std::to_string(index) + ": " + cairn::explain(step.status));
@@ -310,9 +343,7 @@ std::optional<Loop> Mapper::measured_loop(const std::vector<SE2>& poses, std::si
   const std::size_t begin = std::max<std::size_t>(1, by_path(travelled_[first] - options.submap));
   const std::size_t end = std::min(by_path(travelled_[first] + options.submap), poses.size());
   cairn::OccupancyGrid grid = empty_map().grid;
-  grid.insert_all(
-      end - begin, [&](std::size_t i) { return poses[begin + i]; },
-      [&](std::size_t i) -> const std::vector<ScanPoint>& { return points_[begin + i - 1]; });
+  for (std::size_t i = begin; i < end; ++i) grid.insert(poses[i], points_[i - 1]);
   const std::size_t last = poses.size() - 1;
   const std::size_t since = std::max<std::size_t>(1, by_path(travelled_[last] - options.query));
   const std::vector<ScanPoint> query = cairn::thinned(seen_together(poses, points_, since, last), 0.05);
@@ -348,9 +379,7 @@ void Mapper::move_paths() {
   cairn::parallel_for(distinct.size(), options_.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       paths[i] = moved_path(distinct[i]);
-      maps[i].grid.insert_all(
-          points_.size(), [&](std::size_t k) { return paths[i][k + 1].pose; },
-          [&](std::size_t k) -> const std::vector<ScanPoint>& { return points_[k]; });
+      for (std::size_t k = 0; k < points_.size(); ++k) maps[i].grid.insert(paths[i][k + 1].pose, points_[k]);
     }
   });
   for (std::size_t i = 0; i < distinct.size(); ++i)

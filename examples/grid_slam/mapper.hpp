@@ -96,6 +96,12 @@ struct PlaceWindow {
 
 class Reader;
 
+/// A place that explains a scan, and its share of what all such places explain.
+struct PossiblePlace {
+  cairn::SE2 pose;
+  double share = 0;
+};
+
 /// Takes scans one by one.
 class Mapper {
 public:
@@ -109,7 +115,8 @@ public:
   [[nodiscard]] static Mapper loaded(const std::filesystem::path& path, const MapRequest& wanted = {});
   /// A mapper that leaves the saved map of the best particle as it is. It begins where the saved one stood,
   /// or, with a window, at the place in it, of any heading, that explains the first scan best. Throws as
-  /// loaded(), and where the window has no part of the map in it.
+  /// loaded(), and where the window has no part of the map in it. The first scan is refused where no place
+  /// explains it; places() says what looks like the place taken.
   [[nodiscard]] static Mapper localiser(const std::filesystem::path& path, const MapRequest& wanted = {},
                                         const std::optional<PlaceWindow>& window = std::nullopt);
   /// Writes all that the mapper is, or, throwing cairn::Error, leaves the file as it was.
@@ -125,6 +132,9 @@ public:
   [[nodiscard]] const std::vector<Loop>& loops() const noexcept { return loops_; }
   /// Of a mapper that has taken a scan.
   [[nodiscard]] const Belief& belief() const;
+  /// Of a localiser with a window that has taken a scan: the place where it began, then those that look like
+  /// it, if any.
+  [[nodiscard]] const std::vector<PossiblePlace>& places() const noexcept { return places_; }
 
   /// A pose for every scan so far: of the best particle at the processed ones, along the odometry between.
   /// By the drawn poses, or by the means of the densities that they were drawn from.
@@ -144,7 +154,7 @@ private:
   [[nodiscard]] static Mapper loaded(Reader& reader, const MapRequest& wanted);
   void expect_sound(const Reader& reader) const;  // of what was read, but for map and paths
   void begin(const cairn::StampedScan& scan);
-  [[nodiscard]] cairn::Gaussian<cairn::SE2> place_in_window(const cairn::StampedScan& scan) const;
+  [[nodiscard]] cairn::Gaussian<cairn::SE2> place_in_window(const cairn::StampedScan& scan);
   void accumulate(const cairn::SE2& moved);
   void process(const cairn::StampedScan& scan);
   [[nodiscard]] cairn::Matrix<3> motion_noise() const;
@@ -162,6 +172,7 @@ private:
   std::optional<Belief> belief_;
   std::optional<OccupancyMap> frozen_;  // what a localiser moves in
   std::optional<PlaceWindow> window_;
+  std::vector<PossiblePlace> places_;
   std::optional<cairn::Gaussian<cairn::SE2>> start_;
   std::vector<StepRecord> steps_;
   std::vector<std::vector<cairn::ScanPoint>> points_;  // of the processed scans

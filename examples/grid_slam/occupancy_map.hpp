@@ -44,8 +44,14 @@ struct OccupancyMap {
 
 /// Draws from a Gaussian fitted to likelihood times motion around their best pose.
 struct FromMatch {
+  /// A search with a wider kernel, which bridges more and needs neither all points nor the last millimetre.
+  struct Coarse {
+    double width;    ///< of the kernel over the model's
+    double settled;  ///< a step shorter than this ends it [m, rad]
+  };
   cairn::MatchOptions match{};
-  std::vector<double> widths{4, 2};  ///< of the kernel over the model's, before its own
+  std::vector<Coarse> coarse{{4, 4e-3}, {2, 1e-3}};  ///< before the model's own
+  double thinning = 0.1;                             ///< [m] of the points that coarse searches look at
   /// Motions of a smaller share are tried only where the others explain the scan badly, and taken only where
   /// they explain it well: where nothing does, it is the map that is wrong.
   double likely_share = 0.05;
@@ -60,12 +66,13 @@ struct FromMatch {
                                                        const OccupancyMap::Observation& z,
                                                        cairn::Random& random) const {
     std::vector<Peak> peaks;
+    Looked looked{map.grid.field(), cairn::thinned(z, thinning)};
     double inliers = 0;
     for (const bool likely : {true, false}) {
       if (!likely && inliers >= explained_badly) break;
       for (const auto& mode : motion.modes)
         if ((mode.share >= likely_share) == likely)
-          inliers = std::max(inliers, add_peak(peaks, map, mode, z));
+          inliers = std::max(inliers, add_peak(peaks, map, looked, mode, z));
     }
     if (peaks.empty()) return cairn::FromMotion{}(map, motion, z, random);
     std::vector<double> evidence;
@@ -77,7 +84,7 @@ struct FromMatch {
       left -= std::exp(evidence[chosen++] - total);
     const Peak& peak = peaks[chosen];
     const cairn::SE2 x = cairn::sample(peak.q, random);
-    const double l = map.log_likelihood(x, z);
+    const double l = cairn::log_likelihood(map.grid, looked.field, z, x, map.model);
     const double log_target = l + std::log(peak.mode->share) + cairn::log_density(peak.mode->motion, x);
     const double log_drawn = evidence[chosen] - total + cairn::log_density(peak.q, x);
     return {x, peak.q, log_target - log_drawn, l, peak.mode->regime};
@@ -91,21 +98,31 @@ private:
     double log_evidence;  // Laplace's: the integral of likelihood times motion, if that were q's shape
   };
 
+  /// What all searches of one particle share.
+  struct Looked {
+    cairn::OccupancyGrid::Field field;
+    std::vector<cairn::ScanPoint> few;
+  };
+
   /// Returns the share of points that the best pose of this motion explains.
-  double add_peak(std::vector<Peak>& peaks, const OccupancyMap& map, const Mode& mode,
+  double add_peak(std::vector<Peak>& peaks, const OccupancyMap& map, Looked& looked, const Mode& mode,
                   const OccupancyMap::Observation& z) const {
     const cairn::Cholesky<3> motion(mode.motion.covariance);
     if (!motion.good() || !(mode.share > 0)) return 0;
     cairn::MatchOptions options = match;
     options.model = map.model;
-    cairn::SE2 start = best_start(map, mode.motion, z);
-    for (const double width : widths) {
-      options.model.sigma = width * map.model.sigma;
-      start = cairn::match(map.grid, z, start, mode.motion.mean, motion.inverse(), options).pose;
+    cairn::SE2 start = best_start(map, looked, mode.motion);
+    for (const Coarse& search : coarse) {
+      options.model.sigma = search.width * map.model.sigma;
+      options.settled = search.settled;
+      start =
+          cairn::match(map.grid, looked.field, looked.few, start, mode.motion.mean, motion.inverse(), options)
+              .pose;
     }
     options.model = map.model;
+    options.settled = match.settled;
     const cairn::MatchResult found =
-        cairn::match(map.grid, z, start, mode.motion.mean, motion.inverse(), options);
+        cairn::match(map.grid, looked.field, z, start, mode.motion.mean, motion.inverse(), options);
     const cairn::Cholesky<3> information(found.information);
     if (found.status == cairn::MatchStatus::few_inliers || !information.good()) return found.inliers;
     const double enough = mode.share < rare_share ? rare_explained : explained_well;
@@ -119,8 +136,8 @@ private:
 
   /// The best of a lattice of poses over two standard deviations of the motion, no finer than what the widest
   /// kernel bridges; the mean itself where the motion is no wider.
-  [[nodiscard]] cairn::SE2 best_start(const OccupancyMap& map, const cairn::Gaussian<cairn::SE2>& motion,
-                                      const OccupancyMap::Observation& z) const {
+  [[nodiscard]] cairn::SE2 best_start(const OccupancyMap& map, Looked& looked,
+                                      const cairn::Gaussian<cairn::SE2>& motion) const {
     constexpr double reach = 0.15, turn = 0.08;               // [m], [rad] between neighbours
     constexpr double farthest = 3, round = std::numbers::pi;  // [m], [rad]: beyond, odometry says nothing
     const auto count = [](double variance, double most, double spacing) {
@@ -131,16 +148,16 @@ private:
     const int na = count(motion.covariance(2, 2), round, turn);
     if (nx + ny + na == 0) return motion.mean;
     cairn::EndPointModel wide = map.model;
-    wide.sigma *= widths.empty() ? 1 : widths.front();
-    const std::vector<cairn::ScanPoint> few = cairn::thinned(z, 0.2);
+    wide.sigma *= coarse.empty() ? 1 : coarse.front().width;
+    const std::vector<cairn::ScanPoint> few = cairn::thinned(looked.few, 2 * thinning);
     cairn::SE2 best = motion.mean;
-    double most = cairn::log_likelihood(map.grid, few, best, wide);
+    double most = cairn::log_likelihood(map.grid, looked.field, few, best, wide);
     for (int a = -na; a <= na; ++a)
       for (int y = -ny; y <= ny; ++y)
         for (int x = -nx; x <= nx; ++x) {
           const cairn::SE2 pose =
               cairn::retract(motion.mean, cairn::Vector<3>(reach * x, reach * y, turn * a));
-          const double l = cairn::log_likelihood(map.grid, few, pose, wide);
+          const double l = cairn::log_likelihood(map.grid, looked.field, few, pose, wide);
           if (l <= most) continue;
           most = l;
           best = pose;

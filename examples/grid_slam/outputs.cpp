@@ -78,32 +78,106 @@ example::PlaneCurve curve_of(const std::string& name, Ink ink, const std::vector
 }
 
 #ifdef EXAMPLES_HAVE_PNG
+/// Where the pixels of a page's picture lie.
+struct Canvas {
+  double left = 0, top = 0, pixel = 1;  // [m]
+  int width = 1, height = 1;
+
+  [[nodiscard]] float column(const cairn::SE2& p) const { return static_cast<float>((p.x() - left) / pixel); }
+  [[nodiscard]] float row(const cairn::SE2& p) const { return static_cast<float>((top - p.y()) / pixel); }
+};
+
+/// Of all these maps, and with no more pixels than a page shows.
+Canvas canvas_of(const std::vector<const MapImage*>& maps) {
+  double left = maps.front()->left, bottom = maps.front()->bottom, right = left, top = bottom;
+  const double cell = maps.front()->cell_size;
+  for (const MapImage* m : maps) {
+    left = std::min(left, m->left);
+    bottom = std::min(bottom, m->bottom);
+    right = std::max(right, m->left + cell * m->image.width());
+    top = std::max(top, m->bottom + cell * m->image.height());
+  }
+  constexpr double most = 1400;  // pixels
+  Canvas canvas{left, top,
+                cell * std::max(1.0, std::ceil(std::max(right - left, top - bottom) / cell / most))};
+  canvas.width = std::max(1, static_cast<int>(std::ceil((right - left) / canvas.pixel)));
+  canvas.height = std::max(1, static_cast<int>(std::ceil((top - bottom) / canvas.pixel)));
+  return canvas;
+}
+
+/// The map on the canvas; where a pixel has several cells, the darkest known one.
+cairn::Image drawn_on(const Canvas& canvas, const MapImage& map) {
+  cairn::Image image(canvas.width, canvas.height, unknown_grey);
+  const double height = map.image.height() * map.cell_size;
+  for (int r = 0; r < map.image.height(); ++r)
+    for (int c = 0; c < map.image.width(); ++c) {
+      const std::uint8_t grey = map.image(c, r);
+      if (grey == unknown_grey) continue;
+      const int column =
+          static_cast<int>((map.left - canvas.left + (c + 0.5) * map.cell_size) / canvas.pixel);
+      const int row =
+          static_cast<int>((canvas.top - map.bottom - height + (r + 0.5) * map.cell_size) / canvas.pixel);
+      if (column < 0 || row < 0 || column >= canvas.width || row >= canvas.height) continue;
+      std::uint8_t& pixel = image(column, row);
+      if (pixel == unknown_grey || grey < pixel) pixel = grey;
+    }
+  return image;
+}
+
+example::Marks marked(const std::string& name, Ink ink) {
+  return {name, ink, {}, {}};
+}
+void add_step(example::Marks& marks, const Canvas& canvas, const cairn::SE2& from, const cairn::SE2& to) {
+  marks.segments.push_back({canvas.column(from), canvas.row(from), canvas.column(to), canvas.row(to)});
+}
+
+constexpr const char* ancestors =
+    " The particles' paths lie on each other where they have an ancestor in common.";
+
 void add_map(example::Report& page, const Results& r) {
-  const auto column = [&](const cairn::SE2& p) {
-    return static_cast<float>((p.x() - r.map.left) / r.map.cell_size);
-  };
-  const auto row = [&](const cairn::SE2& p) {
-    return static_cast<float>(r.map.image.height()) -
-           static_cast<float>((p.y() - r.map.bottom) / r.map.cell_size);
-  };
-  example::Marks all{"all particles' paths", Ink::violet, {}, {}}, path{"path", Ink::belief, {}, {}};
+  const Canvas canvas = canvas_of({&r.map});
+  example::Marks all = marked("all particles' paths", Ink::violet), path = marked("path", Ink::belief);
   for (const auto& each : r.paths)
-    for (std::size_t k = 1; k < each.size(); ++k)
-      all.segments.push_back({column(each[k - 1]), row(each[k - 1]), column(each[k]), row(each[k])});
+    for (std::size_t k = 1; k < each.size(); ++k) add_step(all, canvas, each[k - 1], each[k]);
   for (std::size_t k = 1; k < r.means.size(); ++k)
-    path.segments.push_back({column(r.means[k - 1].pose), row(r.means[k - 1].pose), column(r.means[k].pose),
-                             row(r.means[k].pose)});
-  page.add(example::Picture{
-      .title = "The map and the paths",
-      .caption =
-          "The map of the best particle, " + readable(100 * r.map.cell_size) +
-          " cm a pixel, grey where no beam has been. The particles' paths lie on each other where they "
-          "have an ancestor in common.",
-      .png = example::png_bytes(r.map.image),
-      .width = r.map.image.width(),
-      .height = r.map.image.height(),
-      .marks = {path, all},
-      .wide = true});
+    add_step(path, canvas, r.means[k - 1].pose, r.means[k].pose);
+  page.add(example::Picture{.title = "The map and the paths",
+                            .caption = "The map of the best particle, " + readable(100 * canvas.pixel) +
+                                       " cm a pixel, grey where no beam has been." + ancestors,
+                            .png = example::png_bytes(drawn_on(canvas, r.map)),
+                            .width = canvas.width,
+                            .height = canvas.height,
+                            .marks = {path, all},
+                            .wide = true});
+}
+
+/// The map as it grew.
+void add_film(example::Report& page, const Results& r) {
+  std::vector<const MapImage*> maps;
+  for (const Snapshot& s : r.snapshots) maps.push_back(&s.map);
+  const Canvas canvas = canvas_of(maps);
+  example::PictureFilm film{.title = "The map as it grew",
+                            .caption = "The map of the particle that was best at each time, " +
+                                       readable(100 * canvas.pixel) +
+                                       " cm a pixel, grey where no beam has been." + ancestors +
+                                       " Where a loop is closed, they are one path again.",
+                            .slider = {"scan", ""},
+                            .width = canvas.width,
+                            .height = canvas.height,
+                            .wide = true};
+  for (const Snapshot& s : r.snapshots) {
+    example::Marks all = marked("all particles' paths", Ink::violet), best = marked("best path", Ink::belief);
+    for (const auto& [from, to] : s.paths) add_step(all, canvas, from, to);
+    for (std::size_t k = 1; k < s.best.size(); ++k) add_step(best, canvas, s.best[k - 1], s.best[k]);
+    film.frames.push_back({.at = static_cast<double>(s.scans),
+                           .caption = std::to_string(s.processed) + " scans processed, " +
+                                      std::to_string(s.loops) + (s.loops == 1 ? " loop" : " loops") +
+                                      "; effective number of particles " + readable(s.effective_size) +
+                                      "; maps " + readable(static_cast<double>(s.bytes) / 1048576.0) + " MB",
+                           .png = example::png_bytes(drawn_on(canvas, s.map)),
+                           .marks = {best, all}});
+  }
+  page.add(film);
 }
 #endif
 
@@ -130,6 +204,24 @@ void add_spread(example::Report& page, const Results& r) {
       .y = {"sigma", "m, deg"},
       .x_values = step,
       .curves = {{"position [m]", Ink::belief, sigma}, {"heading [deg]", Ink::teal, turn}},
+      .logarithmic = true});
+}
+
+void add_memory(example::Report& page, const Results& r) {
+  if (r.snapshots.empty()) return;
+  std::vector<double> step, shared, separate;
+  for (const Snapshot& s : r.snapshots) {
+    step.push_back(static_cast<double>(s.processed));
+    shared.push_back(static_cast<double>(s.bytes) / 1048576.0);
+    separate.push_back(static_cast<double>(s.separate_bytes) / 1048576.0);
+  }
+  page.add(example::LinePlot{
+      .title = "Memory of the maps",
+      .caption = "All particles' maps together: tiles that several particles have in common are held once.",
+      .x = {"processed scan", ""},
+      .y = {"memory", "MB"},
+      .x_values = step,
+      .curves = {{"held", Ink::belief, shared}, {"if each had its own", Ink::grey, separate}},
       .logarithmic = true});
 }
 
@@ -170,9 +262,27 @@ std::size_t map_bytes(const Mapper::Belief& belief) {
   };
   for (std::size_t i = 0; i < belief.size(); ++i) {
     belief[i].map.grid.cells().for_each_tile(count);
-    belief[i].map.grid.field().tiles().for_each_tile(count);
   }
   return bytes;
+}
+
+Snapshot snapshot_of(const Mapper& mapper) {
+  const Mapper::Belief& belief = mapper.belief();
+  const std::size_t best = belief.best();
+  Snapshot s{.scans = mapper.scans().size(),
+             .processed = mapper.steps().size(),
+             .loops = mapper.loops().size(),
+             .effective_size = mapper.steps().empty() ? 0 : mapper.steps().back().effective_size,
+             .map = map_image(belief[best].map.grid),
+             .bytes = map_bytes(belief)};
+  const auto record = belief.record();
+  for (const auto& [pose, parent] : record.nodes)
+    if (parent < record.nodes.size()) s.paths.push_back({record.nodes[parent].pose.pose, pose.pose});
+  for (const auto& pose : belief.path(best)) s.best.push_back(pose.pose);
+  for (std::size_t i = 0; i < belief.size(); ++i)
+    belief[i].map.grid.cells().for_each_tile(
+        [&](cairn::TileAddress, const auto& tile) { s.separate_bytes += sizeof tile; });
+  return s;
 }
 
 std::string summary(const Results& r) {
@@ -185,6 +295,12 @@ std::string summary(const Results& r) {
   json["resampled"] = std::ranges::count_if(r.steps, &StepRecord::resampled);
   json["loops"] = r.loops.size();
   json["paths_moved"] = std::ranges::count_if(r.steps, &StepRecord::moved);
+  if (!r.places.empty()) {
+    json["places"] = Json::array();
+    for (const PossiblePlace& p : r.places)
+      json["places"].push_back(
+          {{"x_m", p.pose.x()}, {"y_m", p.pose.y()}, {"heading_rad", p.pose.angle()}, {"share", p.share}});
+  }
   json["ended_early"] = r.ended_early ? Json(*r.ended_early) : Json(nullptr);
   const auto& p = r.newest.covariance;
   json["newest_pose"] = {
@@ -215,7 +331,10 @@ std::optional<std::string> report(const Results& r) {
                  readable(r.of_means->mean_angle * degrees) + " deg; means of the proposals"});
   page.figure({"Maps of all particles", readable(static_cast<double>(r.bytes) / 1048576.0), "MB"});
 #ifdef EXAMPLES_HAVE_PNG
-  add_map(page, r);
+  if (r.snapshots.empty())
+    add_map(page, r);
+  else
+    add_film(page, r);
 #endif
   page.add(example::PlanePlot{
       .title = "Path and odometry",
@@ -224,6 +343,7 @@ std::optional<std::string> report(const Results& r) {
       .y = {"y", "m"},
       .curves = {curve_of("odometry", Ink::wrong, r.odometry), curve_of("path", Ink::belief, r.means)}});
   add_spread(page, r);
+  add_memory(page, r);
   add_errors(page, r);
   return page.html();
 }

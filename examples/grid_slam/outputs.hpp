@@ -7,6 +7,7 @@
 /// seed, whatever the number of threads.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -27,8 +28,20 @@ namespace grid_slam {
 /// Of all cells that are known, with a margin of one; one unknown pixel where none is.
 [[nodiscard]] MapImage map_image(const cairn::OccupancyGrid& grid);
 
-/// Bytes of the particles' maps and fields, what they share counted once.
+/// Bytes of the particles' maps, what they share counted once.
 [[nodiscard]] std::size_t map_bytes(const Mapper::Belief& belief);
+
+/// How things stood after some scan: a frame of the report's film.
+struct Snapshot {
+  std::size_t scans = 0, processed = 0, loops = 0;  ///< so far
+  double effective_size = 0;
+  MapImage map;                                    ///< of the best particle
+  std::vector<std::array<cairn::SE2, 2>> paths{};  ///< steps of all particles' paths, each once
+  std::vector<cairn::SE2> best{};                  ///< the best particle's path
+  std::size_t bytes = 0;                           ///< as map_bytes()
+  std::size_t separate_bytes = 0;                  ///< if no particle shared anything
+};
+[[nodiscard]] Snapshot snapshot_of(const Mapper& mapper);
 
 struct Results {
   std::string name;  ///< of the log
@@ -36,12 +49,14 @@ struct Results {
   std::size_t particles = 0, scans = 0;
   std::vector<StepRecord> steps;
   std::vector<Loop> loops;
+  std::vector<PossiblePlace> places;  ///< where a localiser may have begun, the one taken first
   std::vector<cairn::StampedPose2> odometry, drawn, means, rematched;
   std::optional<cairn::RelationError> of_odometry, of_drawn, of_means, of_rematched;
   cairn::Gaussian<cairn::SE2> newest;
   MapImage map;
   std::size_t bytes = 0;
   std::vector<std::vector<cairn::SE2>> paths;  ///< of all particles
+  std::vector<Snapshot> snapshots;             ///< in their order, if any were asked for
   std::optional<std::string> ended_early;
   unsigned threads = 1;
   double seconds = 0, cpu_seconds = 0;

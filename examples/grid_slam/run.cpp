@@ -16,24 +16,29 @@ void measure(Results& r, const std::vector<cairn::PoseRelation>& relations) {
 }
 
 Results run(Mapper& mapper, const cairn::CarmenLog& log, const std::vector<cairn::PoseRelation>& relations,
-            const std::function<std::optional<std::string>()>& on_scan) {
+            const std::function<std::optional<std::string>()>& on_scan, std::size_t frames) {
   Results r;
   r.seed = mapper.options().seed;
   r.particles = mapper.options().particles;
   r.threads = mapper.options().threads;
   const auto begin = std::chrono::steady_clock::now();
   const std::clock_t cpu = std::clock();
-  for (const cairn::StampedScan& scan : log.scans) {
-    mapper.add(scan);
+  const std::size_t count = log.scans.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    mapper.add(log.scans[i]);
     if (on_scan) r.ended_early = on_scan();
     if (r.ended_early) break;
+    if ((i + 1) * frames / count != i * frames / count && i + 1 < count)
+      r.snapshots.push_back(snapshot_of(mapper));
   }
+  if (frames > 0 && !mapper.scans().empty()) r.snapshots.push_back(snapshot_of(mapper));
   r.scans = mapper.scans().size();
   for (const cairn::StampedScan& scan : mapper.scans()) r.odometry.push_back({scan.time, scan.T_odom_laser});
   r.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   r.cpu_seconds = static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC;
   r.steps = mapper.steps();
   r.loops = mapper.loops();
+  r.places = mapper.places();
   r.drawn = mapper.trajectory(false);
   r.means = mapper.trajectory(true);
   r.rematched = mapper.rematched();

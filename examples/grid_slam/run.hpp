@@ -19,10 +19,12 @@
 namespace grid_slam {
 
 /// Lets the mapper take the log. `on_scan` is called after every scan; what it returns, if anything, ends the
-/// run and says why. Relations may be none. Throws cairn::Error where the log cannot be mapped.
+/// run and says why. Relations may be none. `frames` is how often a snapshot is taken, over the log and at
+/// its end. Throws cairn::Error where the log cannot be mapped.
 [[nodiscard]] Results run(Mapper& mapper, const cairn::CarmenLog& log,
                           const std::vector<cairn::PoseRelation>& relations,
-                          const std::function<std::optional<std::string>()>& on_scan = {});
+                          const std::function<std::optional<std::string>()>& on_scan = {},
+                          std::size_t frames = 0);
 
 /// The same with a new mapper.
 [[nodiscard]] Results run(const cairn::CarmenLog& log, const MapperOptions& options,

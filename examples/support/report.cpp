@@ -126,6 +126,17 @@ Json curves_of(const std::string& panel, const std::vector<PlaneCurve>& curves) 
   return json;
 }
 
+Json marks_of(const std::vector<Marks>& all) {
+  Json json = Json::array();
+  for (const Marks& marks : all)
+    json.push_back({{"name", marks.name},
+                    {"ink", name_of(marks.ink)},
+                    {"count", std::max(marks.points.size(), marks.segments.size())},
+                    {"points", packed_rows(marks.points)},
+                    {"segments", packed_rows(marks.segments)}});
+  return json;
+}
+
 /// What a plot and a film in the plane have in common.
 template <class Panel>
 Json plane_head(const char* kind, const Panel& panel) {
@@ -248,13 +259,22 @@ void Report::add(const Picture& panel) {
   json["png"] = base64(panel.png);
   json["width"] = panel.width;
   json["height"] = panel.height;
-  json["marks"] = Json::array();
-  for (const Marks& marks : panel.marks)
-    json["marks"].push_back({{"name", marks.name},
-                             {"ink", name_of(marks.ink)},
-                             {"count", std::max(marks.points.size(), marks.segments.size())},
-                             {"points", packed_rows(marks.points)},
-                             {"segments", packed_rows(marks.segments)}});
+  json["marks"] = marks_of(panel.marks);
+  panels_.push_back(dumped(json));
+}
+
+void Report::add(const PictureFilm& panel) {
+  Json json = head("picture_film", panel);
+  json["slider"] = axis(panel.slider);
+  json["width"] = panel.width;
+  json["height"] = panel.height;
+  json["start"] = panel.frames.empty() ? 0 : panel.frames.size() - 1;
+  json["frames"] = Json::array();
+  for (const PictureFrame& frame : panel.frames)
+    json["frames"].push_back({{"at", rounded(frame.at)},
+                              {"caption", frame.caption},
+                              {"png", base64(frame.png)},
+                              {"marks", marks_of(frame.marks)}});
   panels_.push_back(dumped(json));
 }
 

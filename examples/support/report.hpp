@@ -162,6 +162,26 @@ struct Picture {
   bool wide = false;
 };
 
+/// One position of a picture film's slider.
+struct PictureFrame {
+  double at = 0;             ///< what the slider measures
+  std::string caption = {};  ///< what happens here
+  std::string png = {};      ///< the bytes of a PNG file of the film's size
+  std::vector<Marks> marks = {};
+};
+
+/// Images of one size with marks that change along a slider: moved with the mouse or the arrow keys, or
+/// played. The last is shown first.
+struct PictureFilm {
+  std::string title = {};
+  std::string caption = {};
+  Axis slider = {};
+  int width = 0;
+  int height = 0;
+  std::vector<PictureFrame> frames = {};
+  bool wide = false;
+};
+
 struct Table {
   std::string title = {};
   std::string caption = {};
@@ -212,6 +232,7 @@ public:
   void add(const PlaneFilm& panel);
   void add(const HeatMap& panel);
   void add(const Picture& panel);
+  void add(const PictureFilm& panel);
   void add(const Table& panel);
   void add(const Cloud& panel);
 

@@ -37,6 +37,24 @@ double clipped(double x0, double y0, double x1, double y1, CellAddress cell) {
 }  // namespace
 
 TEST_SUITE("grid/ray") {
+  TEST_CASE("ray: walk_cells goes through the cells of walk_ray, through corners too") {
+    const std::uint64_t seed = cairn_test::seed(9);
+    CAPTURE(seed);
+    Random random(seed);
+    for (int trial = 0; trial < 2000; ++trial) {
+      const auto any = [&] {
+        const double x = random.uniform(-40, 40);
+        return trial % 3 == 0 ? std::round(4 * x) / 4 : x;  // through many corners
+      };
+      const double x0 = any(), y0 = any(), x1 = trial % 10 == 0 ? x0 : any(),
+                   y1 = trial % 10 == 1 ? y0 : any();
+      std::vector<CellAddress> with_lengths, without;
+      walk_ray(x0, y0, x1, y1, [&](CellAddress cell, double) { with_lengths.push_back(cell); });
+      walk_cells(x0, y0, x1, y1, [&](CellAddress cell) { without.push_back(cell); });
+      REQUIRE(with_lengths == without);
+    }
+  }
+
   TEST_CASE("ray: the cells and lengths are those that clipping every cell of the box gives") {
     const std::uint64_t seed = cairn_test::seed();
     CAPTURE(seed);

@@ -73,6 +73,44 @@ TEST_SUITE("scan/correlative") {
     }
   }
 
+  TEST_CASE(
+      "correlative: places apart are those of taking the best pose, then the best beside it, and so on") {
+    const std::uint64_t seed = cairn_test::seed(4);
+    CAPTURE(seed);
+    Random random(seed);
+    std::size_t seconds = 0;
+    for (int trial = 0; trial < 200; ++trial) {
+      const CorrelativeSearch search(drawn_grid(random, 24), 1 + static_cast<int>(random.below(5)));
+      const auto points = drawn_points(random, 0.8);
+      const SE2 middle(0.03, 0.07, random.uniform(-3, 3));
+      const SearchWindow window{random.uniform(0, 0.9), random.uniform(0, 0.9), random.uniform(0, 0.4)};
+      const PlacesApart apart{random.uniform(0.15, 0.8), random.uniform(0.05, 0.5)};
+      const auto places = search.find_places(points, middle, window, 3, apart);
+      const double step = search.heading_step(points);
+      const int a = static_cast<int>(window.angle / step), x = static_cast<int>(window.x / 0.1),
+                y = static_cast<int>(window.y / 0.1);
+      for (std::size_t n = 0; n < 3; ++n) {
+        double best = 0;
+        for (int i = -a; i <= a; ++i)
+          for (int j = -y; j <= y; ++j)
+            for (int k = -x; k <= x; ++k) {
+              const SE2 pose(middle.x() + 0.1 * k, middle.y() + 0.1 * j, middle.angle() + i * step);
+              bool beside = true;
+              for (std::size_t m = 0; m < n && m < places.size(); ++m)
+                beside =
+                    beside &&
+                    ((places[m].pose.translation() - pose.translation()).norm() >= apart.distance - 1e-9 ||
+                     std::abs(wrapped(places[m].pose.angle() - pose.angle())) >= apart.angle - 1e-9);
+              if (beside) best = std::max(best, search.score(points, pose));
+            }
+        REQUIRE((n < places.size() ? places[n].score : 0.0) == doctest::Approx(best).epsilon(1e-12));
+        if (n >= places.size()) break;
+        seconds += n == 1;
+      }
+    }
+    CHECK(seconds > 50);
+  }
+
   TEST_CASE("correlative: a square's largest is the largest of its cells") {
     const std::uint64_t seed = cairn_test::seed(2);
     CAPTURE(seed);

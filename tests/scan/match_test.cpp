@@ -88,9 +88,9 @@ TEST_SUITE("scan/match") {
       const SE2 pose(0.3 + random.uniform(-0.03, 0.03), 0.1 + random.uniform(-0.03, 0.03),
                      0.4 + random.uniform(-0.01, 0.01));
       const ScanLikelihood at = evaluate(grid, points, pose, model);
-      REQUIRE(at.log_likelihood == doctest::Approx(log_likelihood(grid, points, pose, model)).epsilon(1e-9));
+      REQUIRE(at.log_likelihood == doctest::Approx(log_likelihood(grid, points, pose, model)).epsilon(1e-6));
       // Points that cross into another cell step by the field's rounding: most trials agree, not all.
-      const double h = 1e-6;
+      const double h = 1e-5;  // below, single precision shows
       for (int k = 0; k < 3; ++k) {
         Vector<3> d = Vector<3>::Zero();
         d(k) = h;
@@ -110,7 +110,7 @@ TEST_SUITE("scan/match") {
     for (int trial = 0; trial < 200; ++trial) {
       const SE2 start(random.uniform(-6, 6), random.uniform(-6, 6), random.uniform(-3, 3));
       const MatchResult found = match(grid, points, start, start, Matrix<3>::Zero());
-      REQUIRE(found.log_likelihood >= log_likelihood(grid, points, start, {}) - 1e-9);
+      REQUIRE(found.log_likelihood >= log_likelihood(grid, points, start, {}) - 1e-5);
       REQUIRE(std::isfinite(found.pose.x() + found.pose.y() + found.pose.angle()));
       REQUIRE(all_finite(found.information));
     }

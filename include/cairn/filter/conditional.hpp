@@ -472,20 +472,36 @@ struct ConditionalFilter {
       belief.resample(scheme, random);
       result.resampled = true;
     }
-    if (insert)
-      parallel_for(belief.size(), threads, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i) {
-          auto& particle = belief.particles_.states[i];
-          if constexpr (ChoosingMap<M>)
-            particle.map.insert(particle.pose, z, particle.choice);
-          else
-            particle.map.insert(particle.pose, z);
-        }
-      });
+    if (insert) insert_in_all(belief, z);
     return result;
   }
 
 private:
+  /// Copies that resampling made of one particle, which follow each other, take the observation in once and
+  /// go on sharing their map.
+  template <ConditionalMap M>
+  void insert_in_all(MappedPaths<M>& belief, const typename M::Observation& z) const {
+    auto& all = belief.particles_.states;
+    std::vector<std::size_t> first, of;  // of the same copies
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (i == 0 || all[i].node != all[i - 1].node) first.push_back(i);
+      of.push_back(first.back());
+      if constexpr (std::default_initializable<M>)
+        if (of[i] != i) all[i].map = M{};  // so that nothing is copied that the first one writes
+    }
+    parallel_for(first.size(), threads, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t k = begin; k < end; ++k) {
+        auto& particle = all[first[k]];
+        if constexpr (ChoosingMap<M>)
+          particle.map.insert(particle.pose, z, particle.choice);
+        else
+          particle.map.insert(particle.pose, z);
+      }
+    });
+    for (std::size_t i = 0; i < all.size(); ++i)
+      if (of[i] != i) all[i].map = all[of[i]].map;
+  }
+
   static constexpr std::uint64_t all_particles = 0xffffffffU;
   static constexpr std::uint64_t stream(std::uint64_t step, std::uint64_t slot) noexcept {
     return (step << 32U) + slot;

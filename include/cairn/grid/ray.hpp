@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <limits>
 
 #include <cairn/core/check.hpp>
@@ -27,15 +28,17 @@ class RayAxis {
 public:
   RayAxis(double from, double to)
       : from_(from),
-        length_(to - from),
+        inverse_(1 / (to - from)),
         cell_(static_cast<std::int32_t>(std::floor(from))),
         last_(static_cast<std::int32_t>(std::floor(to))),
-        step_(last_ < cell_ ? -1 : 1) {
+        step_(last_ < cell_ ? -1 : 1),
+        border_(last_ < cell_ ? 0 : 1) {
     aim();
   }
 
   [[nodiscard]] std::int32_t cell() const noexcept { return cell_; }
   [[nodiscard]] double next() const noexcept { return next_; }
+  [[nodiscard]] std::int64_t steps() const noexcept { return std::abs(std::int64_t{last_} - cell_); }
   void advance() noexcept {
     cell_ += step_;
     aim();
@@ -44,13 +47,23 @@ public:
 private:
   void aim() noexcept {
     next_ = cell_ == last_ ? std::numeric_limits<double>::infinity()
-                           : std::min(1.0, (cell_ + (step_ > 0 ? 1 : 0) - from_) / length_);
+                           : std::min(1.0, (cell_ + border_ - from_) * inverse_);
   }
 
-  double from_, length_;
-  std::int32_t cell_, last_, step_;
+  double from_, inverse_;
+  std::int32_t cell_, last_, step_, border_;
   double next_ = 0;
 };
+
+}  // namespace detail
+
+namespace detail {
+
+inline void check_ray(double x0, double y0, double x1, double y1) {
+  const auto has_cell = [](double x) { return std::abs(x) < static_cast<double>(farthest_cell); };
+  CAIRN_EXPECTS(has_cell(x0) && has_cell(y0) && has_cell(x1) && has_cell(y1),
+                "a ray needs finite end points less than 2^28 cells from the origin");
+}
 
 }  // namespace detail
 
@@ -59,9 +72,7 @@ private:
 /// end points must be finite and less than 2^28 cells from the origin.
 template <class Visit>
 void walk_ray(double x0, double y0, double x1, double y1, Visit&& visit) {
-  const auto has_cell = [](double x) { return std::abs(x) < static_cast<double>(farthest_cell); };
-  CAIRN_EXPECTS(has_cell(x0) && has_cell(y0) && has_cell(x1) && has_cell(y1),
-                "walk_ray needs finite end points less than 2^28 cells from the origin");
+  detail::check_ray(x0, y0, x1, y1);
   const double length = std::hypot(x1 - x0, y1 - y0);
   detail::RayAxis x(x0, x1), y(y0, y1);
   double share = 0;
@@ -74,6 +85,21 @@ void walk_ray(double x0, double y0, double x1, double y1, Visit&& visit) {
       x.advance();
     else
       y.advance();
+  }
+}
+
+/// Calls visit(cell) for the same cells in the same order: without lengths, in half the time.
+template <class Visit>
+void walk_cells(double x0, double y0, double x1, double y1, Visit&& visit) {
+  detail::check_ray(x0, y0, x1, y1);
+  detail::RayAxis x(x0, x1), y(y0, y1);
+  visit(CellAddress{x.cell(), y.cell()});
+  for (std::int64_t left = x.steps() + y.steps(); left > 0; --left) {
+    if (x.next() <= y.next())
+      x.advance();
+    else
+      y.advance();
+    visit(CellAddress{x.cell(), y.cell()});
   }
 }
 

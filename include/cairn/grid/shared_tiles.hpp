@@ -25,10 +25,17 @@
 
 namespace cairn { inline namespace CAIRN_ABI {
 
+/// What a tile of such cells is: an array of them, row by row. A specialisation may keep more beside the
+/// cells, which read and write like an array's.
+template <class Cell>
+struct TileOf {
+  using type = std::array<Cell, tile_cells>;
+};
+
 template <class Cell>
 class SharedTiles {
 public:
-  using Tile = std::array<Cell, tile_cells>;
+  using Tile = typename TileOf<Cell>::type;
 
   /// The cell, or Cell{} where nothing was written. Two loads and a comparison from the tile's own.
   [[nodiscard]] const Cell& read(CellAddress cell) const noexcept {

@@ -100,6 +100,12 @@ struct SearchWindow {
   double angle = 0.3;  ///< [rad], at most pi
 };
 
+/// From where on two poses are two places, by either.
+struct PlacesApart {
+  double distance = 1;  ///< [m]
+  double angle = 0.5;   ///< [rad]
+};
+
 /// The best pose of the lattice and its score, the mean worth of the points over 255.
 struct CorrelativeMatch {
   SE2 pose;
@@ -112,9 +118,14 @@ namespace detail {
 class TranslationSearch {
 public:
   using Cells = std::vector<std::pair<int, int>>;  // of the points, from the grid's corner
+  /// Translations that are not looked at: less than `radius` cells from (x, y).
+  struct Disc {
+    double x, y, radius;
+  };
 
-  TranslationSearch(const std::vector<ScoreGrid>& levels, const Cells& cells, int reach_x, int reach_y)
-      : levels_(levels), cells_(cells), reach_x_(reach_x), reach_y_(reach_y) {}
+  TranslationSearch(const std::vector<ScoreGrid>& levels, const Cells& cells, int reach_x, int reach_y,
+                    const std::vector<Disc>& taken)
+      : levels_(levels), cells_(cells), reach_x_(reach_x), reach_y_(reach_y), taken_(taken) {}
 
   /// Raises `best` (a sum of scores) and writes its translation where one is better.
   bool run(long& best, std::pair<int, int>& where) {
@@ -135,7 +146,7 @@ private:
   }
 
   void descend(int level, int x, int y, long upper, long& best, std::pair<int, int>& where) {
-    if (upper <= best) return;
+    if (upper <= best || is_taken(x, y, (1 << level) - 1)) return;
     if (level == 0) {
       best = upper;
       where = {x, y};
@@ -166,9 +177,20 @@ private:
     }
   }
 
+  /// Whether a disc holds all of the square from (x, y) on that is `more` cells wider than one.
+  [[nodiscard]] bool is_taken(int x, int y, int more) const {
+    for (const Disc& disc : taken_) {
+      const double dx = std::max(std::abs(x - disc.x), std::abs(x + more - disc.x));
+      const double dy = std::max(std::abs(y - disc.y), std::abs(y + more - disc.y));
+      if (dx * dx + dy * dy < disc.radius * disc.radius) return true;
+    }
+    return false;
+  }
+
   const std::vector<ScoreGrid>& levels_;
   const Cells& cells_;
   int reach_x_, reach_y_;
+  const std::vector<Disc>& taken_;
   bool found_ = false;
 };
 
@@ -190,27 +212,23 @@ public:
   /// origin.
   [[nodiscard]] std::optional<CorrelativeMatch> find(std::span<const ScanPoint> points, const SE2& middle,
                                                      const SearchWindow& window, double least = 0) const {
-    check(middle, window);
-    if (points.empty()) return std::nullopt;
-    const GridGeometry& geometry = levels_.front().geometry();
-    const int reach_x = static_cast<int>(window.x / geometry.cell_size);
-    const int reach_y = static_cast<int>(window.y / geometry.cell_size);
-    const double step = heading_step(points);
-    const int headings = static_cast<int>(window.angle / step);
-    const double scale = 255.0 * static_cast<double>(points.size());
-    long best = static_cast<long>(std::floor(std::max(0.0, least) * scale));
-    std::optional<CorrelativeMatch> found;
-    for (int k = 0; k <= 2 * headings; ++k) {  // 0, 1, -1, 2, -2, ...: the likely ones first
-      const int heading = k % 2 == 1 ? (k + 1) / 2 : -k / 2;
-      const SE2 turned(middle.x(), middle.y(), middle.angle() + heading * step);
-      const auto cells = cells_of(points, turned);
-      std::pair<int, int> where;
-      if (!detail::TranslationSearch(levels_, cells, reach_x, reach_y).run(best, where)) continue;
-      found = {SE2(turned.x() + where.first * geometry.cell_size,
-                   turned.y() + where.second * geometry.cell_size, turned.angle()),
-               static_cast<double>(best) / scale};
+    return find_beside({}, {}, points, middle, window, least);
+  }
+
+  /// Up to `count` places in the order of falling scores, each the best of the lattice that is `apart` or
+  /// more from all before it, by so many metres or so many radians: look-alikes, if there are any. Throws as
+  /// find().
+  [[nodiscard]] std::vector<CorrelativeMatch> find_places(std::span<const ScanPoint> points,
+                                                          const SE2& middle, const SearchWindow& window,
+                                                          std::size_t count, const PlacesApart& apart,
+                                                          double least = 0) const {
+    std::vector<CorrelativeMatch> places;
+    while (places.size() < count) {
+      const auto next = find_beside(places, apart, points, middle, window, least);
+      if (!next) break;
+      places.push_back(*next);
     }
-    return found;
+    return places;
   }
 
   /// The score of one pose, in the cells that its points fall into.
@@ -229,6 +247,40 @@ public:
   }
 
 private:
+  [[nodiscard]] std::optional<CorrelativeMatch> find_beside(const std::vector<CorrelativeMatch>& taken,
+                                                            const PlacesApart& apart,
+                                                            std::span<const ScanPoint> points,
+                                                            const SE2& middle, const SearchWindow& window,
+                                                            double least) const {
+    check(middle, window);
+    if (points.empty()) return std::nullopt;
+    const GridGeometry& geometry = levels_.front().geometry();
+    const int reach_x = static_cast<int>(window.x / geometry.cell_size);
+    const int reach_y = static_cast<int>(window.y / geometry.cell_size);
+    const double step = heading_step(points);
+    const int headings = static_cast<int>(window.angle / step);
+    const double scale = 255.0 * static_cast<double>(points.size());
+    long best = static_cast<long>(std::floor(std::max(0.0, least) * scale));
+    std::optional<CorrelativeMatch> found;
+    for (int k = 0; k <= 2 * headings; ++k) {  // 0, 1, -1, 2, -2, ...: the likely ones first
+      const int heading = k % 2 == 1 ? (k + 1) / 2 : -k / 2;
+      const SE2 turned(middle.x(), middle.y(), middle.angle() + heading * step);
+      std::vector<detail::TranslationSearch::Disc> discs;
+      for (const CorrelativeMatch& place : taken)
+        if (std::abs(wrapped(place.pose.angle() - turned.angle())) < apart.angle)
+          discs.push_back({(place.pose.x() - middle.x()) / geometry.cell_size,
+                           (place.pose.y() - middle.y()) / geometry.cell_size,
+                           apart.distance / geometry.cell_size});
+      const auto cells = cells_of(points, turned);
+      std::pair<int, int> where;
+      if (!detail::TranslationSearch(levels_, cells, reach_x, reach_y, discs).run(best, where)) continue;
+      found = {SE2(turned.x() + where.first * geometry.cell_size,
+                   turned.y() + where.second * geometry.cell_size, turned.angle()),
+               static_cast<double>(best) / scale};
+    }
+    return found;
+  }
+
   void check(const SE2& middle, const SearchWindow& window) const {
     const GridGeometry& geometry = levels_.front().geometry();
     const double widest = 1000 * geometry.cell_size;

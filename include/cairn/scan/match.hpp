@@ -16,10 +16,13 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 #include <span>
-#include <vector>
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/cholesky.hpp>
@@ -29,6 +32,7 @@
 #include <cairn/manifold/se2.hpp>
 #include <cairn/scan/occupancy_grid.hpp>
 #include <cairn/scan/scan.hpp>
+#include <cairn/simd/registers.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
@@ -36,14 +40,14 @@ namespace cairn { inline namespace CAIRN_ABI {
 /// The model of a scan's end points in a distance field.
 struct EndPointModel {
   double sigma = 0.03;     ///< of an end point across a wall of the map [m]
-  double outliers = 0.05;  ///< e above
+  double outliers = 0.05;  ///< e above, at least 1e-30
   /// u above: what an end point in a cell that no beam has entered is worth. Between e, by which scans would
   /// be drawn back to what is known, and 1, by which they would flee from it.
   double unknown = 0.4;
   double independence = 0.2;  ///< in (0, 1]
 
   [[nodiscard]] bool valid() const noexcept {
-    return sigma > 0 && std::isfinite(sigma) && outliers > 0 && outliers < 1 && unknown >= outliers &&
+    return sigma > 0 && std::isfinite(sigma) && outliers >= 1e-30 && outliers < 1 && unknown >= outliers &&
            unknown <= 1 && independence > 0 && independence <= 1;
   }
 };
@@ -61,12 +65,106 @@ struct ScanLikelihood {
 
 namespace detail {
 
+/// Four floats at once, on every target alike, so that results do not depend on the width of its registers.
+using FourFloats = LaneOfWidth<float, 4>;
+typedef std::int32_t FourInts __attribute__((vector_size(16)));
+
+/// e^x for x <= 0, to a few units in the last place; 0 far below.
+[[gnu::always_inline]] inline FourFloats exp_of_negative(FourFloats x) noexcept {
+  const FourFloats lowest = FourFloats{} - 80.0F;
+  x = x < lowest ? lowest : x;
+  const FourFloats doublings = x * 1.44269504F;
+  const FourInts whole = __builtin_convertvector(doublings - 0.5F, FourInts);  // to the nearest
+  const FourFloats r = (doublings - __builtin_convertvector(whole, FourFloats)) * 0.693147181F;
+  FourFloats sum = 1 + r * (1.0F / 6);
+  for (int k = 5; k > 0; --k) sum = 1 + r * (sum * (1.0F / static_cast<float>(k)));
+  return sum * std::bit_cast<FourFloats>((whole + 127) << 23);
+}
+
+/// End points at one pose, a block at a time: what the field knows where they fall.
+class PointBlock {
+public:
+  static constexpr std::size_t size = 64;
+  using Numbers = std::array<float, size>;
+
+  std::size_t count = 0;
+  std::size_t unknown = 0;            // points where no beam has been
+  alignas(16) Numbers alone;          // what a point without an obstacle near is worth, 0 where one is near
+  alignas(16) Numbers dx, dy;         // to the obstacle, across its line if there is one [m], in the world
+  alignas(16) Numbers pxx, pxy, pyy;  // what of a move the distance feels: a projection on the normal
+  alignas(16) Numbers qx, qy;         // from the laser to the point [m], in the world
+
+  void take(OccupancyGrid::Field& field, const GridGeometry& geometry, const EndPointModel& model,
+            const SE2& pose, std::span<const ScanPoint> points) noexcept {
+    count = points.size();
+    unknown = 0;
+    const double c = std::cos(pose.angle()), s = std::sin(pose.angle()), scale = 1 / geometry.cell_size;
+    const double x0 = (pose.x() - geometry.origin_x) * scale, y0 = (pose.y() - geometry.origin_y) * scale;
+    std::array<double, size> column, row;
+    for (std::size_t i = 0; i < count; ++i) {
+      const double x = c * points[i].x - s * points[i].y, y = s * points[i].x + c * points[i].y;
+      qx[i] = static_cast<float>(x);
+      qy[i] = static_cast<float>(y);
+      column[i] = x0 + scale * x;
+      row[i] = y0 + scale * y;
+    }
+    for (std::size_t i = 0; i < count; ++i) look_up(i, column[i], row[i], field, geometry, model);
+    for (std::size_t i = count; i % 4 != 0; ++i) {  // what fills the last four changes nothing
+      alone[i] = 1;
+      dx[i] = dy[i] = pxx[i] = pxy[i] = pyy[i] = qx[i] = qy[i] = 0;
+    }
+  }
+  /// Fours of points.
+  [[nodiscard]] std::size_t fours() const noexcept { return (count + 3) / 4; }
+  [[nodiscard]] static FourFloats four(const Numbers& numbers, std::size_t k) noexcept {
+    FourFloats out;
+    std::memcpy(&out, numbers.data() + 4 * k, sizeof out);
+    return out;
+  }
+
+private:
+  void look_up(std::size_t i, double column, double row, OccupancyGrid::Field& field,
+               const GridGeometry& geometry, const EndPointModel& model) noexcept {
+    dx[i] = dy[i] = pxx[i] = pxy[i] = pyy[i] = 0;
+    constexpr double far = farthest_cell;
+    if (!(std::abs(column) < far && std::abs(row) < far)) {
+      ++unknown;
+      alone[i] = static_cast<float>(model.unknown);
+      qx[i] = qy[i] = 0;  // which may be no numbers
+      return;
+    }
+    const CellAddress cell{floor_of(column), floor_of(row)};
+    const NearestObstacle& o = field.at(cell);
+    if (!o.found) {
+      const bool known = field.cell(cell).known();
+      unknown += known ? 0 : 1;
+      alone[i] = static_cast<float>(known ? model.outliers : model.unknown);
+      return;
+    }
+    alone[i] = 0;
+    const auto size_of_cell = static_cast<float>(geometry.cell_size);
+    const float x = size_of_cell * (o.dx + static_cast<float>(cell.column + 0.5 - column));
+    const float y = size_of_cell * (o.dy + static_cast<float>(cell.row + 0.5 - row));
+    const bool line = o.has_line();
+    pxx[i] = line ? o.normal_x * o.normal_x : 1;
+    pxy[i] = line ? o.normal_x * o.normal_y : 0;
+    pyy[i] = line ? o.normal_y * o.normal_y : 1;
+    dx[i] = pxx[i] * x + pxy[i] * y;
+    dy[i] = pxy[i] * x + pyy[i] * y;
+  }
+  [[nodiscard]] static std::int32_t floor_of(double x) noexcept {  // less a call
+    const auto whole = static_cast<std::int32_t>(x);
+    return whole - (x < whole ? 1 : 0);
+  }
+};
+
 /// Sum of logarithms of numbers of at most 1: one logarithm for many, before their product is too small.
 class SumOfLogs {
 public:
-  void add(double factor) noexcept {
-    product_ *= factor;
-    if (product_ < 1e-200) flush();
+  void add(FourFloats factors) noexcept {
+    product_ *= static_cast<double>(factors[0]) * static_cast<double>(factors[1]) *
+                (static_cast<double>(factors[2]) * static_cast<double>(factors[3]));
+    if (product_ < 1e-150) flush();
   }
   [[nodiscard]] double value() noexcept {
     flush();
@@ -81,164 +179,110 @@ private:
   double sum_ = 0, product_ = 1;
 };
 
-/// Looks cells of the field up; neighbouring points mostly lie in the same tile.
-class FieldReader {
-public:
-  explicit FieldReader(const OccupancyGrid& map) : map_(map) {}
+/// Sums over the points of a scan, in the world's directions: the likelihood, and with `Slopes` its gradient
+/// and curvature.
+template <bool Slopes>
+struct PointSums {
+  SumOfLogs logs;
+  FourFloats inliers{};
+  FourFloats gx{}, gy{}, ga{};                    // gradient
+  FourFloats xx{}, xy{}, yy{}, xa{}, ya{}, aa{};  // curvature
 
-  /// Whether a beam has entered the cell.
-  [[nodiscard]] bool known(double column, double row) const noexcept {
-    return map_.cells().read(cell_at(column, row)).known();
-  }
-
-  /// The step [cells] from (column, row) to the nearest obstacle and its normal; false where none is near.
-  bool find(double column, double row, float step[2], float normal[2]) noexcept {
-    const CellAddress cell = cell_at(column, row);
-    const TileAddress address = tile_of(cell);
-    if (!looked_ || address != address_) {
-      tile_ = map_.field().tile(address);
-      address_ = address;
-      looked_ = true;
+  void add(const PointBlock& points, const EndPointModel& model) noexcept {
+    const auto information = static_cast<float>(1 / (model.sigma * model.sigma));
+    const auto share = static_cast<float>(1 - model.outliers), outliers = static_cast<float>(model.outliers);
+    const FourFloats zero{}, one = zero + 1.0F;
+    for (std::size_t k = 0; k < points.fours(); ++k) {
+      const FourFloats alone = PointBlock::four(points.alone, k);
+      const FourFloats dx = PointBlock::four(points.dx, k), dy = PointBlock::four(points.dy, k);
+      const FourFloats squared = (dx * dx + dy * dy) * information;
+      const FourFloats near = alone == zero ? share * exp_of_negative(-0.5F * squared) : zero;
+      const FourFloats factor = alone == zero ? near + outliers : alone;
+      logs.add(factor);
+      if constexpr (!Slopes) continue;
+      const FourFloats matched = squared < zero + 9.0F ? one : zero;
+      inliers += alone == zero ? matched : zero;
+      const FourFloats weight = near / factor * information;  // probability of no outlier
+      const FourFloats qx = PointBlock::four(points.qx, k), qy = PointBlock::four(points.qy, k);
+      const FourFloats pxx = PointBlock::four(points.pxx, k), pxy = PointBlock::four(points.pxy, k),
+                       pyy = PointBlock::four(points.pyy, k);
+      gx += weight * dx;
+      gy += weight * dy;
+      ga += weight * (dy * qx - dx * qy);
+      const FourFloats tx = pxy * qx - pxx * qy, ty = pyy * qx - pxy * qy;  // felt of a turn
+      xx += weight * pxx;
+      xy += weight * pxy;
+      yy += weight * pyy;
+      xa += weight * tx;
+      ya += weight * ty;
+      aa += weight * (ty * qx - tx * qy);
     }
-    if (tile_ == nullptr) return false;
-    const NearestObstacle& o = (*tile_)[place_in_tile(cell)];
-    if (!o.found()) return false;
-    constexpr float unit = 1.0F / NearestObstacle::steps;
-    step[0] = static_cast<float>(o.dx) * unit + static_cast<float>(cell.column + 0.5 - column);
-    step[1] = static_cast<float>(o.dy) * unit + static_cast<float>(cell.row + 0.5 - row);
-    normal[0] = static_cast<float>(o.normal_x) * (1.0F / 127);
-    normal[1] = static_cast<float>(o.normal_y) * (1.0F / 127);
-    return true;
   }
-
-private:
-  [[nodiscard]] static CellAddress cell_at(double column, double row) noexcept {
-    const auto c = static_cast<std::int32_t>(column),
-               r = static_cast<std::int32_t>(row);  // floor, less a call
-    return {c - (column < c ? 1 : 0), r - (row < r ? 1 : 0)};
-  }
-
-  const OccupancyGrid& map_;
-  const DistanceField::Tile* tile_ = nullptr;
-  TileAddress address_{};
-  bool looked_ = false;
 };
 
-/// One end point at a pose: distance d and its derivative by a step of the pose, for one or two directions.
-struct PointResidual {
-  int count = 0;  // 0: nothing near; 1: across a line; 2: to a point
-  double squared = 0;
-  double d[2] = {0, 0};
-  Vector<3> slope[2];
-};
-
-/// Evaluates end points at one pose.
-class EndPoints {
-public:
-  EndPoints(const OccupancyGrid& map, const SE2& pose)
-      : reader_(map),
-        geometry_(map.geometry()),
-        pose_(pose),
-        cosine_(std::cos(pose.angle())),
-        sine_(std::sin(pose.angle())) {}
-
-  /// What a point without an obstacle near is worth.
-  double alone(const ScanPoint& p, const EndPointModel& model) const noexcept {
-    const double x = pose_.x() + cosine_ * p.x - sine_ * p.y, y = pose_.y() + sine_ * p.x + cosine_ * p.y;
-    const bool known = geometry_.contains(x, y) && reader_.known(geometry_.column_of(x), geometry_.row_of(y));
-    return known ? model.outliers : model.unknown;
+template <bool Slopes>
+ScanLikelihood evaluated(const OccupancyGrid& map, OccupancyGrid::Field& field,
+                         std::span<const ScanPoint> points, const SE2& pose, const EndPointModel& model) {
+  PointSums<Slopes> sums;
+  PointBlock block;
+  std::size_t unknown = 0;
+  for (std::size_t i = 0; i < points.size(); i += PointBlock::size) {
+    block.take(field, map.geometry(), model, pose,
+               points.subspan(i, std::min(PointBlock::size, points.size() - i)));
+    sums.add(block, model);
+    unknown += block.unknown;
   }
-
-  /// Squared distance [m^2] of a point, negative where no obstacle is near.
-  double squared_distance(const ScanPoint& p) noexcept {
-    float step[2], normal[2];
-    if (!find(p, step, normal)) return -1;
-    const double size = geometry_.cell_size, dx = static_cast<double>(step[0]),
-                 dy = static_cast<double>(step[1]);
-    if (normal[0] == 0 && normal[1] == 0) return size * size * (dx * dx + dy * dy);
-    const double across = size * (dx * static_cast<double>(normal[0]) + dy * static_cast<double>(normal[1]));
-    return across * across;
+  ScanLikelihood out;
+  out.log_likelihood = model.independence * sums.logs.value();
+  if constexpr (Slopes) {
+    const auto total = [&](const FourFloats& f) {
+      return model.independence * (static_cast<double>(f[0] + f[1]) + static_cast<double>(f[2] + f[3]));
+    };
+    Matrix<3> turn = Matrix<3>::Identity();  // steps of the pose are along the laser's axes
+    turn(0, 0) = turn(1, 1) = std::cos(pose.angle());
+    turn(1, 0) = std::sin(pose.angle());
+    turn(0, 1) = -turn(1, 0);
+    Matrix<3> curvature;
+    curvature(0, 0) = total(sums.xx);
+    curvature(0, 1) = curvature(1, 0) = total(sums.xy);
+    curvature(1, 1) = total(sums.yy);
+    curvature(0, 2) = curvature(2, 0) = total(sums.xa);
+    curvature(1, 2) = curvature(2, 1) = total(sums.ya);
+    curvature(2, 2) = total(sums.aa);
+    out.gradient = turn.transpose() * Vector<3>(total(sums.gx), total(sums.gy), total(sums.ga));
+    out.curvature = turn.transpose() * curvature * turn;
+    const double inliers = total(sums.inliers) / model.independence;
+    const std::size_t known = std::max(points.size() - unknown, points.size() / 4);
+    out.inliers = known == 0 ? 0 : inliers / static_cast<double>(known);
+    if (!points.empty()) out.matched = inliers / static_cast<double>(points.size());
   }
-
-  PointResidual residual(const ScanPoint& p) noexcept {
-    PointResidual r;
-    float step[2], normal[2];
-    if (!find(p, step, normal)) return r;
-    const bool line = normal[0] != 0 || normal[1] != 0;
-    r.count = line ? 1 : 2;
-    for (int k = 0; k < r.count; ++k) {
-      const double nx = line ? static_cast<double>(normal[0]) : k == 0 ? 1.0 : 0.0;
-      const double ny = line ? static_cast<double>(normal[1]) : k == 0 ? 0.0 : 1.0;
-      r.d[k] = geometry_.cell_size * (nx * static_cast<double>(step[0]) + ny * static_cast<double>(step[1]));
-      const double u = nx * cosine_ + ny * sine_,
-                   v = ny * cosine_ - nx * sine_;  // the normal, seen by the laser
-      r.slope[k] = Vector<3>(-u, -v, u * p.y - v * p.x);
-      r.squared += r.d[k] * r.d[k];
-    }
-    return r;
-  }
-
-private:
-  bool find(const ScanPoint& p, float step[2], float normal[2]) noexcept {
-    const double x = pose_.x() + cosine_ * p.x - sine_ * p.y, y = pose_.y() + sine_ * p.x + cosine_ * p.y;
-    if (!geometry_.contains(x, y)) return false;
-    return reader_.find(geometry_.column_of(x), geometry_.row_of(y), step, normal);
-  }
-
-  FieldReader reader_;
-  const GridGeometry& geometry_;
-  SE2 pose_;
-  double cosine_, sine_;
-};
+  return out;
+}
 
 }  // namespace detail
 
-/// log p(z | x, m) of the points at a pose.
+/// log p(z | x, m) of the points at a pose. O(points), and the field's searches where it is new.
+[[nodiscard]] inline double log_likelihood(const OccupancyGrid& map, OccupancyGrid::Field& field,
+                                           std::span<const ScanPoint> points, const SE2& pose,
+                                           const EndPointModel& model) {
+  return detail::evaluated<false>(map, field, points, pose, model).log_likelihood;
+}
 [[nodiscard]] inline double log_likelihood(const OccupancyGrid& map, std::span<const ScanPoint> points,
                                            const SE2& pose, const EndPointModel& model) {
-  detail::EndPoints at(map, pose);
-  const double scale = -0.5 / (model.sigma * model.sigma);
-  detail::SumOfLogs sum;
-  for (const ScanPoint& p : points) {
-    const double squared = at.squared_distance(p);
-    sum.add(squared < 0 ? at.alone(p, model)
-                        : (1 - model.outliers) * std::exp(scale * squared) + model.outliers);
-  }
-  return model.independence * sum.value();
+  auto field = map.field();
+  return log_likelihood(map, field, points, pose, model);
 }
 
-/// The same with gradient and curvature.
+/// The same with gradient and curvature. `field` is the map's, kept from one pose to the next.
+[[nodiscard]] inline ScanLikelihood evaluate(const OccupancyGrid& map, OccupancyGrid::Field& field,
+                                             std::span<const ScanPoint> points, const SE2& pose,
+                                             const EndPointModel& model) {
+  return detail::evaluated<true>(map, field, points, pose, model);
+}
 [[nodiscard]] inline ScanLikelihood evaluate(const OccupancyGrid& map, std::span<const ScanPoint> points,
                                              const SE2& pose, const EndPointModel& model) {
-  ScanLikelihood out;
-  detail::EndPoints at(map, pose);
-  const double information = 1 / (model.sigma * model.sigma);
-  std::size_t inliers = 0, unknown = 0;
-  detail::SumOfLogs sum;
-  for (const ScanPoint& p : points) {
-    const detail::PointResidual r = at.residual(p);
-    if (r.count == 0) {
-      const double worth = at.alone(p, model);
-      if (worth > model.outliers) ++unknown;
-      sum.add(worth);
-      continue;
-    }
-    const double near = (1 - model.outliers) * std::exp(-0.5 * information * r.squared);
-    const double weight = near / (near + model.outliers) * information;  // probability of no outlier
-    sum.add(near + model.outliers);
-    if (r.squared * information < 9) ++inliers;
-    for (int k = 0; k < r.count; ++k) {
-      out.gradient -= weight * r.d[k] * r.slope[k];
-      out.curvature += weight * r.slope[k] * r.slope[k].transpose();
-    }
-  }
-  out.log_likelihood = model.independence * sum.value();
-  out.gradient *= model.independence;
-  out.curvature *= model.independence;
-  const std::size_t known = std::max(points.size() - unknown, points.size() / 4);
-  out.inliers = known == 0 ? 0 : static_cast<double>(inliers) / static_cast<double>(known);
-  if (!points.empty()) out.matched = static_cast<double>(inliers) / static_cast<double>(points.size());
-  return out;
+  auto field = map.field();
+  return evaluate(map, field, points, pose, model);
 }
 
 /// How a match ended.
@@ -270,10 +314,12 @@ struct MatchResult {
 };
 
 /// Levenberg-Marquardt from `start` under a Gaussian prior with the given mean and information, which must be
-/// symmetric and positive semi-definite. The result is never worse than the start.
-[[nodiscard]] inline MatchResult match(const OccupancyGrid& map, std::span<const ScanPoint> points,
-                                       const SE2& start, const SE2& prior_mean,
-                                       const Matrix<3>& prior_information, const MatchOptions& options = {}) {
+/// symmetric and positive semi-definite. The result is never worse than the start. `field` is the map's, kept
+/// from one match to the next.
+[[nodiscard]] inline MatchResult match(const OccupancyGrid& map, OccupancyGrid::Field& field,
+                                       std::span<const ScanPoint> points, const SE2& start,
+                                       const SE2& prior_mean, const Matrix<3>& prior_information,
+                                       const MatchOptions& options = {}) {
   CAIRN_EXPECTS(options.model.valid(), "match needs a model within its ranges");
   const auto prior_cost = [&](const SE2& x) {
     const Vector<3> d = local(prior_mean, x);
@@ -281,7 +327,7 @@ struct MatchResult {
   };
   MatchResult best;
   best.pose = start;
-  ScanLikelihood at = evaluate(map, points, start, options.model);
+  ScanLikelihood at = evaluate(map, field, points, start, options.model);
   double cost = prior_cost(start) - at.log_likelihood, damping = 1e-4;
   while (best.steps < options.most_steps) {
     ++best.steps;
@@ -291,7 +337,7 @@ struct MatchResult {
     const Vector<3> step = Cholesky<3>(a).solve(slope);
     if (!all_finite(step)) break;
     const SE2 next = retract(best.pose, step);
-    const ScanLikelihood there = evaluate(map, points, next, options.model);
+    const ScanLikelihood there = evaluate(map, field, points, next, options.model);
     const double next_cost = prior_cost(next) - there.log_likelihood;
     const bool settled = step.cwiseAbs().maxCoeff() < options.settled;
     if (next_cost <= cost) {
@@ -314,6 +360,12 @@ struct MatchResult {
   best.matched = at.matched;
   if (at.inliers < options.enough_inliers) best.status = MatchStatus::few_inliers;
   return best;
+}
+[[nodiscard]] inline MatchResult match(const OccupancyGrid& map, std::span<const ScanPoint> points,
+                                       const SE2& start, const SE2& prior_mean,
+                                       const Matrix<3>& prior_information, const MatchOptions& options = {}) {
+  auto field = map.field();
+  return match(map, field, points, start, prior_mean, prior_information, options);
 }
 
 }}  // namespace cairn::CAIRN_ABI

@@ -13,10 +13,11 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -40,64 +41,91 @@ struct OccupancyCell {
 
   [[nodiscard]] bool known() const noexcept { return visits > 0; }
   [[nodiscard]] bool is_obstacle() const noexcept { return 4 * hits > visits; }
+  /// The mean hit point, from the cell's lower corner [cells].
+  [[nodiscard]] float point_x() const noexcept { return static_cast<float>(mean_x) * (1.0F / 65536); }
+  [[nodiscard]] float point_y() const noexcept { return static_cast<float>(mean_y) * (1.0F / 65536); }
   /// Probability that the cell stops a beam, under Jeffreys' prior; 1/2 where nothing is known.
   [[nodiscard]] double occupancy() const noexcept { return (hits + 0.5) / (visits + 1.0); }
   friend bool operator==(const OccupancyCell&, const OccupancyCell&) = default;
 };
 
+/// A tile of such cells, and which of them are obstacles.
+struct OccupancyTile {
+  std::array<OccupancyCell, tile_cells> cells{};
+  ObstacleBits obstacles{};
+
+  [[nodiscard]] OccupancyCell& operator[](std::size_t place) noexcept { return cells[place]; }
+  [[nodiscard]] const OccupancyCell& operator[](std::size_t place) const noexcept { return cells[place]; }
+  [[nodiscard]] auto begin() const noexcept { return cells.begin(); }
+  [[nodiscard]] auto end() const noexcept { return cells.end(); }
+
+  /// Makes the bit of a cell what the cell is.
+  void mark(std::size_t place) noexcept {
+    const std::uint32_t bit = std::uint32_t{1} << (place % tile_side);
+    std::uint32_t& row = obstacles[place / tile_side];
+    row = cells[place].is_obstacle() ? row | bit : row & ~bit;
+  }
+  friend bool operator==(const OccupancyTile&, const OccupancyTile&) = default;
+};
+template <>
+struct TileOf<OccupancyCell> {
+  using type = OccupancyTile;
+};
+
 /// Options of an occupancy map.
 struct OccupancyOptions {
   GridGeometry geometry{};
-  double field_radius = 5;  ///< how far from an obstacle the field reaches [cells], at most 6
+  double field_radius = 5;  ///< how far from an obstacle the field reaches [cells], at most 16
 };
 
-/// Occupancy counts and the distance field of their obstacles.
+/// Occupancy counts, and the distance field of their obstacles.
 class OccupancyGrid {
 public:
+  using Field = DistanceField<OccupancyCell>;
+
   explicit OccupancyGrid(const OccupancyOptions& options = {})
-      : geometry_(options.geometry), field_(options.field_radius) {
+      : geometry_(options.geometry), field_radius_(options.field_radius) {
     if (!(geometry_.cell_size > 0) || !std::isfinite(geometry_.cell_size) ||
         !std::isfinite(geometry_.origin_x) || !std::isfinite(geometry_.origin_y))
       raise("OccupancyGrid: expected a cell size above zero and a finite origin");
+    static_cast<void>(field());  // refuses a radius out of range
   }
 
-  /// The grid again whose cells() and field().tiles() these are, with the same options: from a file.
-  OccupancyGrid(const OccupancyOptions& options, SharedTiles<OccupancyCell> cells,
-                SharedTiles<NearestObstacle> field)
-      : OccupancyGrid(options) {
+  /// The grid again whose cells() these are, every one marked, with the same options: from a file.
+  OccupancyGrid(const OccupancyOptions& options, SharedTiles<OccupancyCell> cells) : OccupancyGrid(options) {
     cells_ = std::move(cells);
-    field_ = DistanceField(options.field_radius, std::move(field));
     cells_.for_each_tile([&](TileAddress, const auto&) { empty_ = false; });
   }
 
   [[nodiscard]] const GridGeometry& geometry() const noexcept { return geometry_; }
   [[nodiscard]] const SharedTiles<OccupancyCell>& cells() const noexcept { return cells_; }
-  [[nodiscard]] const DistanceField& field() const noexcept { return field_; }
   [[nodiscard]] bool empty() const noexcept { return empty_; }
+  /// Ways to the nearest obstacles, until the grid is changed.
+  [[nodiscard]] Field field() const { return {cells_, field_radius_}; }
 
   /// Takes in the end points of a scan made at `pose`: a hit in each cell with a point, free what lies
-  /// between the scanner and the points. Throws Error where the map would become too wide, or where one scan
-  /// spans more than 2^28 cells.
+  /// between the scanner and the points. O(cells that the beams pass). Throws Error where the map would
+  /// become too wide.
   void insert(const SE2& pose, const std::vector<ScanPoint>& points) {
-    std::vector<CellAddress> changed;
-    take_in(pose, points, changed);
-    rebuild_around(changed);
-  }
-
-  /// Scans in their order, as insert() one by one, with the field built once at the end. `pose(i)` and
-  /// `points(i)` give scan i.
-  template <class Pose, class Points>
-  void insert_all(std::size_t count, const Pose& pose, const Points& points) {
-    std::vector<CellAddress> changed;
-    for (std::size_t i = 0; i < count; ++i) {
-      take_in(pose(i), points(i), changed);
-      if (changed.size() < 100000) continue;
-      std::ranges::sort(changed);
-      changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
+    thread_local Marks marks;  // whose memory serves scan after scan
+    const std::vector<Point> ends = placed(pose, points);
+    if (ends.empty()) return;
+    marks.begin(at(pose.x(), pose.y()), ends);
+    for (const Point& end : ends) marks.ray(end);
+    for (const Point& end : ends) marks.hit(end);
+    marks.for_each_tile([&](TileAddress tile, const auto& visit_cells) {
+      auto& out = cells_.writable_tile(tile);
+      visit_cells([&](std::size_t place, bool stopped) {
+        count(out[place], stopped);
+        if (out[place].hits > 0) out.mark(place);
+      });
+    });
+    auto write = cells_.writer();
+    for (std::size_t i = 0, next = 0; i < ends.size(); i = next) {
+      const Point mean = mean_of_run(ends, i, next);
+      move_mean(write(mean.cell), mean);
     }
-    std::ranges::sort(changed);
-    changed.erase(std::unique(changed.begin(), changed.end()), changed.end());
-    rebuild_around(changed);
+    empty_ = false;
   }
 
 private:
@@ -105,25 +133,6 @@ private:
     double column, row;  // in cells
     CellAddress cell;
   };
-
-  void take_in(const SE2& pose, const std::vector<ScanPoint>& points, std::vector<CellAddress>& changed) {
-    const std::vector<Point> ends = placed(pose, points);
-    if (ends.empty()) return;
-    Marks marks(at(pose.x(), pose.y()), ends);
-    for (const Point& end : ends) marks.ray(end);
-    for (const Point& end : ends) marks.hit(end);
-    marks.for_each_tile([&](TileAddress tile, const auto& visit_cells) {
-      auto& out = cells_.writable_tile(tile);
-      visit_cells([&](CellAddress cell, std::uint8_t mark) {
-        if (count(out[place_in_tile(cell)], mark == Marks::stopped)) changed.push_back(cell);
-      });
-    });
-    for (std::size_t i = 0, next = 0; i < ends.size(); i = next) {
-      const Point mean = mean_of_run(ends, i, next);
-      if (move_mean(mean)) changed.push_back(mean.cell);
-    }
-    empty_ = false;
-  }
 
   [[nodiscard]] Point at(double x, double y) const {
     if (!geometry_.contains(x, y))
@@ -140,12 +149,11 @@ private:
     return out;
   }
 
-  /// What one scan says of the cells in its bounding box, once each.
+  /// What one scan says of the cells in its bounding box, once each: a bit for passed, one for stopped.
   class Marks {
   public:
-    static constexpr std::uint8_t passed = 1, stopped = 2;
-
-    Marks(const Point& start, const std::vector<Point>& ends) : start_(start) {
+    void begin(const Point& start, const std::vector<Point>& ends) {
+      start_ = start;
       CellAddress low = start.cell, high = start.cell;
       for (const Point& end : ends) {
         low = {std::min(low.column, end.cell.column), std::min(low.row, end.cell.row)};
@@ -154,79 +162,79 @@ private:
       first_ = tile_of(low);
       columns_ = tile_of(high).column - first_.column + 1;
       rows_ = tile_of(high).row - first_.row + 1;
-      constexpr std::int64_t most = 1 << 18;  // 16384 cells in square, 268 MB
+      constexpr std::int64_t most = 1 << 20;
       if (std::int64_t{columns_} * rows_ > most)
-        raise("OccupancyGrid: expected a scan over at most 2^28 cells: farther beams, or larger cells?");
-      marks_.resize(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_) * tile_cells);
+        raise("OccupancyGrid: expected a scan within 2^20 tiles, found one of " + std::to_string(columns_) +
+              " x " + std::to_string(rows_));
+      tiles_.assign(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), Tile{});
     }
 
     void ray(const Point& end) {
-      walk_ray(start_.column, start_.row, end.column, end.row,
-               [&](CellAddress cell, double) { marks_[place(cell)] |= passed; });
+      walk_cells(start_.column, start_.row, end.column, end.row, [&](CellAddress cell) {
+        tile(cell).passed[static_cast<std::size_t>(cell.row & 31)] |= bit(cell);
+      });
     }
-    void hit(const Point& end) { marks_[place(end.cell)] = stopped; }
+    void hit(const Point& end) {
+      tile(end.cell).passed[static_cast<std::size_t>(end.cell.row & 31)] |= bit(end.cell);
+      tile(end.cell).stopped[static_cast<std::size_t>(end.cell.row & 31)] |= bit(end.cell);
+    }
 
-    /// visit(tile, cells) with cells(f) calling f(cell, mark), for every tile with a mark.
+    /// visit(tile, cells) with cells(f) calling f(place in the tile, whether stopped), for every tile with a
+    /// mark.
     template <class Visit>
     void for_each_tile(const Visit& visit) const {
       for (std::int32_t t = 0; t < columns_ * rows_; ++t) {
-        const TileAddress tile{first_.column + t % columns_, first_.row + t / columns_};
-        const std::uint8_t* marks = marks_.data() + static_cast<std::size_t>(t) * tile_cells;
-        if (std::all_of(marks, marks + tile_cells, [](std::uint8_t m) { return m == 0; })) continue;
-        const CellAddress corner = corner_of(tile);
-        visit(tile, [&](const auto& f) {
-          for (int i = 0; i < tile_cells; i += 8) {
-            std::uint64_t eight = 0;
-            std::memcpy(&eight, marks + i, 8);
-            if (eight == 0) continue;
-            for (int k = i; k < i + 8; ++k)
-              if (marks[k] != 0)
-                f(CellAddress{corner.column + k % tile_side, corner.row + k / tile_side}, marks[k]);
+        const Tile& marks = tiles_[static_cast<std::size_t>(t)];
+        std::uint32_t any = 0;
+        for (const std::uint32_t row : marks.passed) any |= row;
+        if (any == 0) continue;
+        visit(TileAddress{first_.column + t % columns_, first_.row + t / columns_}, [&](const auto& f) {
+          for (std::size_t row = 0; row < tile_side; ++row) {
+            const std::uint32_t stopped = marks.stopped[row];
+            for (std::uint32_t left = marks.passed[row]; left != 0; left &= left - 1) {
+              const auto column = static_cast<std::uint32_t>(std::countr_zero(left));
+              f(row * tile_side + column, (stopped >> column & 1U) != 0);
+            }
           }
         });
       }
     }
 
   private:
-    [[nodiscard]] std::size_t place(CellAddress cell) const noexcept {
-      const TileAddress tile = tile_of(cell);
-      const auto number = (tile.row - first_.row) * columns_ + (tile.column - first_.column);
-      return static_cast<std::size_t>(number) * tile_cells + place_in_tile(cell);
+    struct Tile {
+      std::array<std::uint32_t, tile_side> passed{}, stopped{};  // a bit a column
+    };
+    [[nodiscard]] static std::uint32_t bit(CellAddress cell) noexcept {
+      return std::uint32_t{1} << static_cast<std::uint32_t>(cell.column & 31);
+    }
+    [[nodiscard]] Tile& tile(CellAddress cell) noexcept {
+      const TileAddress at = tile_of(cell);
+      return tiles_[static_cast<std::size_t>((at.row - first_.row) * columns_ + (at.column - first_.column))];
     }
 
-    Point start_;
+    Point start_{};
     TileAddress first_{};
     std::int32_t columns_ = 0, rows_ = 0;
-    std::vector<std::uint8_t> marks_;
+    std::vector<Tile> tiles_;
   };
 
-  /// Counts a scan in a cell; true where the cell has become an obstacle, or is none any more.
-  static bool count(OccupancyCell& cell, bool stopped) noexcept {
-    const bool before = cell.is_obstacle();
+  static void count(OccupancyCell& cell, bool stopped) noexcept {
     if (cell.visits == 255) {
       cell.visits = 128;
       cell.hits = static_cast<std::uint8_t>((cell.hits + 1) / 2);
     }
     ++cell.visits;
     if (stopped) ++cell.hits;
-    return before != cell.is_obstacle();
   }
 
-  /// Moves the mean hit point of the end's cell towards it; true where the field would show it elsewhere.
-  bool move_mean(const Point& end) {
-    OccupancyCell& cell = cells_.write(end.cell);
+  /// Moves the mean hit point of the end's cell towards it.
+  static void move_mean(OccupancyCell& cell, const Point& end) noexcept {
     const auto moved = [&](std::uint16_t& mean, double fraction) {
       const double before = mean, target = 65535.0 * fraction;
       mean = static_cast<std::uint16_t>(std::lrint(before + (target - before) / std::max<int>(1, cell.hits)));
-      return shown(mean) != shown(static_cast<std::uint16_t>(before));
     };
-    const bool x = moved(cell.mean_x, end.column - end.cell.column);
-    const bool y = moved(cell.mean_y, end.row - end.cell.row);
-    return (x || y) && cell.is_obstacle();
-  }
-  /// The mean as the field rounds it.
-  [[nodiscard]] static int shown(std::uint16_t mean) noexcept {
-    return (static_cast<int>(mean) * NearestObstacle::steps + 32768) >> 16;
+    moved(cell.mean_x, end.column - end.cell.column);
+    moved(cell.mean_y, end.row - end.cell.row);
   }
 
   /// The mean of the points from `first` on that lie in the same cell; `next` is the first beyond.
@@ -242,112 +250,9 @@ private:
     return mean;
   }
 
-  /// Rebuilds the field of the cells that the changed ones reach, as obstacles or through the normals.
-  void rebuild_around(const std::vector<CellAddress>& changed) {
-    const int reach = field_.apron() + normal_reach;
-    std::vector<std::pair<TileAddress, TilePart>> parts;
-    for (const CellAddress& cell : changed) {
-      const TileAddress low = tile_of({cell.column - reach, cell.row - reach});
-      const TileAddress high = tile_of({cell.column + reach, cell.row + reach});
-      for (std::int32_t row = low.row; row <= high.row; ++row)
-        for (std::int32_t column = low.column; column <= high.column; ++column) {
-          const CellAddress corner = corner_of({column, row});
-          const int x = cell.column - corner.column, y = cell.row - corner.row;
-          parts.push_back({{column, row},
-                           {std::max(0, x - reach), std::max(0, y - reach),
-                            std::min(tile_side, x + reach + 1), std::min(tile_side, y + reach + 1)}});
-        }
-    }
-    std::ranges::sort(parts, {}, &std::pair<TileAddress, TilePart>::first);
-    for (std::size_t i = 0; i < parts.size();) {
-      auto [tile, part] = parts[i];
-      for (; i < parts.size() && parts[i].first == tile; ++i) {
-        const TilePart& other = parts[i].second;
-        part = {std::min(part.left, other.left), std::min(part.bottom, other.bottom),
-                std::max(part.right, other.right), std::max(part.top, other.top)};
-      }
-      field_.rebuild(tile, part, obstacles_around(tile, part));
-    }
-  }
-
-  static constexpr int normal_reach = 2;  // cells to either side whose points make a line
-  static constexpr int widest =
-      tile_side + 2 * (static_cast<int>(DistanceField::largest_radius) + normal_reach);
-
-  /// The hit points in and around a part of a tile, in cells from the tile's corner; x is `nothing` where
-  /// there is none.
-  struct Window {
-    static constexpr float nothing = -1e9F;
-    int columns = 0, rows = 0;
-    std::array<float, static_cast<std::size_t>(widest* widest)> x, y;
-    [[nodiscard]] std::size_t place(int column, int row) const noexcept {
-      return static_cast<std::size_t>(row * columns + column);
-    }
-  };
-
-  void fill(Window& window, TileAddress tile, const TilePart& part, int margin) const {
-    window.columns = part.right - part.left + 2 * margin;
-    window.rows = part.top - part.bottom + 2 * margin;
-    const CellAddress corner = corner_of(tile);
-    std::size_t place = 0;
-    for (int row = part.bottom - margin; row < part.top + margin; ++row)
-      for (int column = part.left - margin; column < part.right + margin;) {
-        const CellAddress cell{corner.column + column, corner.row + row};
-        const auto* cells = cells_.tile(tile_of(cell));
-        const int run = std::min(part.right + margin - column, tile_side - (cell.column & 31));
-        const OccupancyCell* c = cells == nullptr ? nullptr : cells->data() + place_in_tile(cell);
-        for (int k = 0; k < run; ++k, ++column, ++place) {
-          window.x[place] = Window::nothing;
-          if (c == nullptr || !c[k].is_obstacle()) continue;
-          window.x[place] = static_cast<float>(column) + static_cast<float>(c[k].mean_x) / 65536.0F;
-          window.y[place] = static_cast<float>(row) + static_cast<float>(c[k].mean_y) / 65536.0F;
-        }
-      }
-  }
-
-  /// The point at a place of the window with the normal of the line through it and its neighbours.
-  [[nodiscard]] static Obstacle obstacle_at(const Window& window, int column, int row) noexcept {
-    const std::size_t center = window.place(column, row);
-    Obstacle o{window.x[center], window.y[center], 0, 0};
-    float n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
-    for (int r = row - normal_reach; r <= row + normal_reach; ++r)
-      for (int c = column - normal_reach; c <= column + normal_reach; ++c) {
-        const std::size_t place = window.place(c, r);
-        if (window.x[place] == Window::nothing) continue;
-        const float x = window.x[place] - o.x, y = window.y[place] - o.y;
-        n += 1;
-        sx += x;
-        sy += y;
-        sxx += x * x;
-        sxy += x * y;
-        syy += y * y;
-      }
-    if (n < 3) return o;
-    const float xx = sxx - sx * sx / n, xy = sxy - sx * sy / n, yy = syy - sy * sy / n;
-    const float half = 0.5F * (xx + yy);
-    const float root = std::sqrt(std::max(0.0F, 0.25F * (xx - yy) * (xx - yy) + xy * xy));
-    constexpr float thin = 0.1F;  // variance across a line over that along it
-    if (!(half - root < thin * (half + root))) return o;
-    const float angle = 0.5F * std::atan2(2 * xy, xx - yy);  // of the line
-    o.normal_x = -std::sin(angle);
-    o.normal_y = std::cos(angle);
-    return o;
-  }
-
-  [[nodiscard]] std::vector<Obstacle> obstacles_around(TileAddress tile, const TilePart& part) const {
-    Window window;
-    fill(window, tile, part, field_.apron() + normal_reach);
-    std::vector<Obstacle> obstacles;
-    for (int row = normal_reach; row < window.rows - normal_reach; ++row)
-      for (int column = normal_reach; column < window.columns - normal_reach; ++column)
-        if (window.x[window.place(column, row)] != Window::nothing)
-          obstacles.push_back(obstacle_at(window, column, row));
-    return obstacles;
-  }
-
   GridGeometry geometry_;
   SharedTiles<OccupancyCell> cells_;
-  DistanceField field_;
+  double field_radius_;
   bool empty_ = true;
 };
 

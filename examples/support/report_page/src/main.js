@@ -2,6 +2,7 @@
 import { cloud } from './cloud.js';
 import { element } from './dom.js';
 import { heat } from './heat.js';
+import { pictureFilm } from './picture_film.js';
 import { film, plane } from './plane.js';
 import { picture, table } from './plain.js';
 import { lines } from './plots.js';
@@ -14,6 +15,7 @@ const kinds = {
   film: { draw: film, empty: (panel) => panel.frames.length === 0 },
   heat: { draw: heat, empty: (panel) => panel.values.length === 0 },
   picture: { draw: picture, empty: (panel) => panel.png === '' },
+  picture_film: { draw: pictureFilm, empty: (panel) => panel.frames.length === 0 },
   table: { draw: table, empty: (panel) => panel.rows.length === 0 },
   cloud: { draw: cloud, empty: (panel) => panel.points === '' && panel.curves.every((curve) => curve.points === '') },
 };

@@ -1,22 +1,22 @@
 // Panels that need no library: pictures with marks, tables.
 import { element, floats, switchable } from './dom.js';
 
-const svgSpace = 'http://www.w3.org/2000/svg';
+export const svgSpace = 'http://www.w3.org/2000/svg';
 
-function svgPath(data, width) {
+export function svgPath(data, width) {
   const path = document.createElementNS(svgSpace, 'path');
   path.setAttribute('d', data);
   path.setAttribute('stroke-width', width);
   return path;
 }
 
-function pathOfPoints(numbers) {
+export function pathOfPoints(numbers) {
   let data = '';
   for (let i = 0; i < numbers.length; i += 2) data += `M${numbers[i].toFixed(1)} ${numbers[i + 1].toFixed(1)}h0`;
   return data;
 }
 
-function pathOfSegments(numbers) {
+export function pathOfSegments(numbers) {
   let data = '';
   for (let i = 0; i < numbers.length; i += 4)
     data += `M${numbers[i].toFixed(1)} ${numbers[i + 1].toFixed(1)}L${numbers[i + 2].toFixed(1)} ${numbers[i + 3].toFixed(1)}`;

@@ -132,7 +132,7 @@ export function plane(panel, body) {
 }
 
 /** Moves the slider on by itself, a whole film in about eight seconds, while the button is pressed. */
-function playButton(slider) {
+export function playButton(slider) {
   const button = element('button', { type: 'button' }, '▶ play');
   let timer = 0;
   const stop = () => {
