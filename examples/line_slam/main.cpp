@@ -28,7 +28,6 @@ namespace {
 using namespace line_slam;
 
 Results run_with_progress(const Drive& drive, const RunOptions& options, bool quiet) {
-  const example::Interruption interruption;
   std::ostream nowhere(nullptr);
   example::Progress progress(quiet ? nowhere : std::clog, "frames", drive.frames.size());
   return run(drive, options, [&]() -> std::optional<std::string> {
@@ -75,6 +74,7 @@ int main(int argc, char** argv) {
   if (const std::optional<int> code = example::parse(app, name, argc, argv)) return *code;
   return example::exit_code_of(name, [&]() -> int {
     prepare_folder(out);
+    const example::Interruption interruption;
     drive_options.seed = options.seed;
     drive_options.threads = options.threads;
     const Drive drive = simulated_drive(drive_options);
