@@ -69,8 +69,11 @@
 #include <cairn/filter/unscented_transform.hpp>
 #include <cairn/filter/vectorised.hpp>
 #include <cairn/geometry/alignment.hpp>
+#include <cairn/geometry/anchored_line.hpp>
 #include <cairn/geometry/calibration_drift.hpp>
 #include <cairn/geometry/camera.hpp>
+#include <cairn/geometry/line.hpp>
+#include <cairn/geometry/line_triangulation.hpp>
 #include <cairn/geometry/motion_calibration.hpp>
 #include <cairn/geometry/ransac.hpp>
 #include <cairn/geometry/rig_correction.hpp>

@@ -15,6 +15,7 @@
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/unscented.hpp>
+#include <cairn/geometry/anchored_line.hpp>
 #include <cairn/geometry/line.hpp>
 #include <cairn/geometry/line_triangulation.hpp>
 #include <cairn/manifold/derivatives.hpp>
@@ -309,6 +310,71 @@ TEST_SUITE("line triangulation") {
     }
     CHECK(cairn::chi_square_mean_band(4, runs, 0.999).contains(nees));
     CHECK(cairn::chi_square_mean_band(2, runs, 0.999).contains(chi2));
+  }
+}
+
+TEST_SUITE("anchored line") {
+  TEST_CASE(
+      "anchored line: there and back, its points lie on the line, and dual to its Pluecker coordinates") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    for (int run = 0; run < 200; ++run) {
+      const SE3 anchor(SO3::exp(some_direction(random)), somewhere(random, 20));
+      const auto [a, b] = ends(random, 2, 30);
+      const LineSegment normalised{{a(0) / a(2), a(1) / a(2)}, {b(0) / b(2) + 0.01, b(1) / b(2)}};
+      const auto x = cairn::AnchoredLine::at(anchor, normalised, Line::through(a, b));
+      REQUIRE(x);
+      const Line line = x->line();
+      CHECK(line.distance(anchor * a) < 1e-9);
+      CHECK(line.distance(anchor * b) < 1e-9);
+      for (const double share : {-0.2, 0.0, 0.4, 1.0}) {
+        const auto p = x->point(share);
+        if (!p) continue;
+        CHECK(line.distance(*p) < 1e-8);
+        CHECK(*x->share(*p) == doctest::Approx(share).epsilon(0.02));
+      }
+      const auto again = x->with(Vector<4>(0.01, -0.02, 0.3, 0.2)).about(line);
+      REQUIRE(again);
+      CHECK(cairn::local(*x, *again).norm() < 1e-12);
+      const Matrix<6, 4> J =
+          cairn::numeric_jacobian([](const cairn::AnchoredLine& y) { return y.pluecker(); }, *x);
+      CHECK((x->pluecker_jacobian() - J).norm() < 1e-8);
+      // Across the line the point of a ray moves by this for a step of the numbers.
+      const Vector<4> step =
+          1e-6 * Vector<4>(random.normal(), random.normal(), random.normal(), random.normal());
+      const Matrix<4> P = step * step.transpose();
+      for (const int end : {0, 1}) {
+        const double moved = line.distance(*retract(*x, step).point(end));
+        CHECK(x->sigma_across(end, P) == doctest::Approx(moved).epsilon(1e-3).scale(1e-9));
+      }
+    }
+    const Line behind = Line::through({-1, 0, -5}, {1, 0, -5});
+    CHECK_FALSE(cairn::AnchoredLine::at(SE3(), {{-0.2, 0}, {0.2, 0}}, behind));
+    CHECK_FALSE(cairn::AnchoredLine::at(SE3(), {{0.1, 0}, {0.1, 0}}, Line::through({-1, 0, 5}, {1, 0, 5})));
+  }
+
+  TEST_CASE("anchored line: distances and Jacobians by Pluecker coordinates are those by the line") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    for (const LineCamera& c : three_cameras())
+      for (int run = 0; run < 50; ++run) {
+        const auto [a, b] = ends(random, 2, 20);
+        const Line line = Line::through(a, b);
+        LineSegment s = view_of(c, a, b);
+        s.to += Vector<2>(random.normal(0, 2), random.normal(0, 2));
+        const double factor = random.uniform(0.1, 10);
+        const auto by_line = c.see(line, s);
+        const auto by_pluecker = c.see(factor * line.moment(), factor * line.direction(), s);
+        CHECK((by_line.distance - by_pluecker.distance).norm() < 1e-9);
+        CHECK((by_line.J_pose - by_pluecker.J_pose).norm() < 1e-8 * (1 + by_line.J_pose.norm()));
+        Vector<6> L;
+        L << factor * line.moment(), factor * line.direction();
+        const Matrix<2, 6> J = cairn::numeric_jacobian(
+            [&](const Vector<6>& l) { return c.see(l.head<3>(), l.tail<3>(), s).distance; }, L);
+        CHECK((by_pluecker.J_line - J).norm() < 1e-5 * (1 + J.norm()));
+      }
   }
 }
 

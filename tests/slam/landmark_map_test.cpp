@@ -505,6 +505,30 @@ TEST_SUITE("slam/landmark_map") {
     MESSAGE("at most ", most, " nodes");
     CHECK(most <= 10);
   }
+
+  TEST_CASE("from_landmarks: of sightings that do not agree with each other the fewer are left out") {
+    const Relative sharp{.covariance = 1e-4 * Matrix<2>::Identity()};
+    Map map(sharp, {.gate = 0.999, .new_density = 1e-6, .clutter_density = 1e-7});
+    const std::vector<Plane> apart{{0, 0}, {8, 0}, {0, 8}, {8, 8}, {4, 4}};
+    for (std::uint32_t k = 0; k < 5; ++k) map.insert(Plane::Zero(), {{apart[k], k}}, {new_landmark});
+    for (int again = 0; again < 10; ++again) map.insert(Plane::Zero(), {{apart[4], 4U}}, {4});  // the surest
+    const Plane is(0.5, -0.4);
+    Map::Observation z;
+    for (std::uint32_t k = 0; k < 5; ++k)
+      z.push_back({apart[k] - is + (k == 4 ? Plane(0.6, 0.5) : Plane(0, 0)), {}});
+    const Gaussian<Plane> moved{Plane::Zero(), 0.25 * Matrix<2>::Identity()};
+    Random random(1);
+    const auto careful = FromLandmarks{.associations = 2, .hypotheses = 5}(map, moved, z, random);
+    CHECK((careful.drawn_from.mean - is).norm() < 0.01);
+    for (std::uint32_t k = 0; k < 4; ++k) CHECK(careful.choice[k] == k);
+    CHECK(careful.choice[4] != 4);
+    const auto trusting = FromLandmarks{}(map, moved, z, random);
+    CHECK(trusting.choice[4] == 4);
+    CHECK((trusting.drawn_from.mean - is).norm() > 0.05);
+    // Named ones are believed, whatever the others say.
+    for (std::uint32_t k = 0; k < 5; ++k) z[k].identity = k;
+    CHECK(FromLandmarks{.hypotheses = 5}(map, moved, z, random).choice[4] == 4);
+  }
 }
 
 }  // namespace landmark_map_test

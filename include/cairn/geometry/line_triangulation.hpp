@@ -46,6 +46,13 @@ struct SegmentDistance {
   Matrix<2, 6> J_pose = Matrix<2, 6>::Zero();  ///< by a step of the rig's pose in the line's frame
 };
 
+/// The same of a line in Pluecker coordinates of any common length.
+struct PlueckerDistance {
+  Vector<2> distance = Vector<2>::Zero();
+  Matrix<2, 6> J_line = Matrix<2, 6>::Zero();  ///< by moment, then direction
+  Matrix<2, 6> J_pose = Matrix<2, 6>::Zero();  ///< by a step of the rig's pose in the line's frame
+};
+
 /// A camera of a rig, prepared for lines. Immutable.
 class LineCamera {
 public:
@@ -103,6 +110,27 @@ public:
       const Vector<3> by_normal = transposed_product(projection_, e.J_line);
       result.distance(end) = e.distance;
       put(result.J_line, end, 0, transposed_product(by_normal, by_line));
+      put(result.J_pose, end, 0, transposed_product(by_normal, by_pose));
+    }
+    return result;
+  }
+
+  /// Distances of a segment's ends from the line of moment m and direction d, rig frame.
+  [[nodiscard]] PlueckerDistance see(const Vector<3>& m, const Vector<3>& d,
+                                     const LineSegment& segment) const {
+    // n = m - c x d; a step (rho, w) of the rig moves d by -w x d and m by -w x m - rho x d
+    const Matrix<3> D = skew(d), C = skew(centre());
+    Matrix<3, 6> by_pose;
+    put(by_pose, 0, 0, D);
+    put(by_pose, 0, 3, Matrix<3>(skew(m) - product(C, D)));
+    const Vector<3> l = product(projection_, Vector<3>(m - product(C, d)));
+    PlueckerDistance result;
+    for (int end = 0; end < 2; ++end) {
+      const LineDistance e = distance_to(l, end == 0 ? segment.from : segment.to);
+      const Vector<3> by_normal = transposed_product(projection_, e.J_line);
+      result.distance(end) = e.distance;
+      put(result.J_line, end, 0, transposed(by_normal));
+      put(result.J_line, end, 3, Matrix<1, 3>(-transposed_product(by_normal, C)));
       put(result.J_pose, end, 0, transposed_product(by_normal, by_pose));
     }
     return result;

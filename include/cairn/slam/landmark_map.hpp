@@ -28,17 +28,13 @@
 /// ```
 ///
 /// A sensor whose report can only be predicted with the sighting at hand, such as the distances of a
-/// segment's ends from a line, gives a model of that sighting: an ordinary sensor whose Measurement is those
-/// numbers, and what they should be.
-///
-/// ```cpp
-///   SegmentEnds of(const Measurement& z) const;  // predict, both Jacobians and noise of SegmentEnds,
-///                                                // and SegmentEnds::Measurement measured() const
-///   bool may_be(const State& x, const Measurement& z, const Part& m) const;  // optional: a cheap first look
-///   bool determines(const Measurement& z) const;  // optional: whether a landmark may begin with it
-///   void note(Part& m, const State& x, const Measurement& z) const;  // optional: what is not in the
-///   Gaussian
-/// ```
+/// segment's ends from a line (examples/line_slam), gives a model of that sighting: an ordinary sensor whose
+/// Measurement is those numbers, and what they should be.
+///   of(z)                 that model: predict, both Jacobians, noise of its own Measurement; measured()
+///   in_reach(x, m)        optional, for landmarks without a place: whether it may be seen from here at all
+///   may_be(x, z, m)       optional: a cheap first look at a candidate
+///   determines(z)         optional: whether a landmark may begin with this sighting
+///   note(m, x, z)         optional: changes what a landmark carries besides its Gaussian, after an update
 #pragma once
 
 #include <algorithm>
@@ -275,6 +271,11 @@ public:
     return std::log(not_a_landmark == new_landmark ? options().new_density : options().clutter_density);
   }
 
+  /// Whether a sighting lies inside the gate of one without a name about this landmark, which is there.
+  [[nodiscard]] bool agrees(const Gaussian<Pose>& x, const Measurement& z, std::uint32_t number) const {
+    return candidate(x, z, number, common_->gate).has_value();
+  }
+
   /// Takes the sightings in: updates, new landmarks, and the odds of what was not seen though in view.
   void insert(const Pose& x, const Observation& z, const Choice& n);
   /// The same with the likeliest association at this pose.
@@ -325,8 +326,10 @@ private:
   }
   [[nodiscard]] std::optional<Candidate> candidate(const Gaussian<Pose>& x, const Measurement& z,
                                                    std::uint32_t number, double gate) const;
+  [[nodiscard]] std::vector<std::uint32_t> in_reach(const Pose& x) const;
   template <class Visit>
-  void for_each_near(const Gaussian<Pose>& x, const Measurement& z, Visit&& visit) const;
+  void for_each_near(const Gaussian<Pose>& x, const Measurement& z, const std::vector<std::uint32_t>& near,
+                     Visit&& visit) const;
   [[nodiscard]] Chosen<Choice> likeliest(const Candidates& candidates) const;
   [[nodiscard]] static Chosen<Choice> drawn(const Candidates& candidates, Random& random);
 
@@ -358,6 +361,15 @@ struct FromLandmarks {
   enum class Weight { exact, evidence };
   Weight weight = Weight::exact;
   int iterations = 1;  ///< of each sighting's update: more where the sensor bends over the pose's spread
+  /// How often it is chosen which landmarks the sightings are of: with the pose as the motion leaves it, then
+  /// again with the pose as that choice makes it, which tells neighbours apart that the motion cannot.
+  int associations = 1;
+  /// Above 0: of the first choice only those stay that agree. So many of the surest are taken in alone, one
+  /// at a time, and the one whose pose has most of the others inside their gates decides; the rest are called
+  /// clutter (J. Civera, O. Grasa, A. Davison, J. Montiel, "1-point RANSAC for EKF filtering", IROS 2009).
+  /// Where the motion leaves more room than neighbours are apart. With Pick::drawn the probability of the
+  /// choice is then no longer what is divided by.
+  int hypotheses = 0;
 
   /// Throws Error where the motion's covariance is singular: then use FromMotion, or say how the wheels slip.
   template <LandmarkSensor L, class F>
@@ -371,8 +383,16 @@ struct FromLandmarks {
           "FromLandmarks: expected a motion that is uncertain in every direction, found a singular "
           "covariance");
     Chosen<Association> chosen = map.associate(motion, z, random);
+    if (hypotheses > 0) keep_agreeing(chosen.choice, motion, map, z);
     Gaussian<typename L::State> q = motion;
-    const double log_evidence = take_in(q, map, z, chosen.choice);
+    double log_evidence = take_in(q, map, z, chosen.choice);
+    for (int again = 1; again < associations; ++again) {
+      Chosen<Association> next = map.associate(q, z, random);
+      if (next.choice == chosen.choice && map.options().pick == Pick::likeliest) break;
+      chosen = std::move(next);
+      q = motion;
+      log_evidence = take_in(q, map, z, chosen.choice);
+    }
     typename L::State x = sample(q, random);
     const double log_likelihood = map.log_likelihood(x, z, chosen.choice);
     const double log_weight = weight == Weight::evidence
@@ -387,15 +407,57 @@ struct FromLandmarks {
   }
 
 private:
+  struct Known {
+    std::size_t sighting;
+    double log_volume;
+  };
+  static void sort_surest_first(std::vector<Known>& known) {
+    std::sort(known.begin(), known.end(), [](const Known& a, const Known& b) {
+      return a.log_volume < b.log_volume || (a.log_volume == b.log_volume && a.sighting < b.sighting);
+    });
+  }
+
+  template <LandmarkSensor L, class F>
+  void keep_agreeing(Association& n, const Gaussian<typename L::State>& motion, const LandmarkMap<L, F>& map,
+                     const typename LandmarkMap<L, F>::Observation& z) const {
+    using Model = detail::ModelOf<L>;
+    std::vector<Known> known;
+    for (std::size_t k = 0; k < z.size(); ++k)
+      if (const auto* landmark = map.find(n[k])) {
+        const auto& model = detail::model_of(map.sensor(), z[k].z);
+        const detail::SensorOfPose<Model> sensor{model, landmark->belief};
+        known.push_back(
+            {k, Cholesky<dof<typename Model::Measurement>>(sensor.noise(motion.mean)).log_determinant()});
+      }
+    sort_surest_first(known);
+    std::vector<bool> best, agrees(z.size());
+    std::size_t most = 0;
+    for (std::size_t h = 0; h < known.size() && h < static_cast<std::size_t>(hypotheses); ++h) {
+      Gaussian<typename L::State> q = motion;
+      const std::size_t first = known[h].sighting;
+      const auto& model = detail::model_of(map.sensor(), z[first].z);
+      const auto in = Extended{.iterations = iterations}.update(
+          q, detail::SensorOfPose<Model>{model, map.find(n[first])->belief},
+          detail::measured<L>(model, z[first].z));
+      if (!in.accepted()) continue;
+      std::size_t count = 0;
+      for (const Known& each : known) {
+        agrees[each.sighting] = map.agrees(q, z[each.sighting].z, n[each.sighting]);
+        count += agrees[each.sighting];
+      }
+      if (count <= most) continue;
+      most = count;
+      best = agrees;
+    }
+    for (const Known& each : known)
+      if (most > 0 && !best[each.sighting] && !z[each.sighting].identity) n[each.sighting] = no_landmark;
+  }
+
   /// Returns the sum of the innovations' log densities.
   template <LandmarkSensor L, class F>
   double take_in(Gaussian<typename L::State>& q, const LandmarkMap<L, F>& map,
                  const typename LandmarkMap<L, F>::Observation& z, const Association& n) const {
     using Model = detail::ModelOf<L>;
-    struct Known {
-      std::size_t sighting;
-      double log_volume;
-    };
     double log_evidence = 0;
     std::vector<Known> known;
     for (std::size_t k = 0; k < z.size(); ++k) {
@@ -409,9 +471,7 @@ private:
       known.push_back(
           {k, Cholesky<dof<typename Model::Measurement>>(sensor.noise(q.mean)).log_determinant()});
     }
-    std::sort(known.begin(), known.end(), [](const Known& a, const Known& b) {
-      return a.log_volume < b.log_volume || (a.log_volume == b.log_volume && a.sighting < b.sighting);
-    });
+    sort_surest_first(known);
     const Extended filter{.iterations = iterations};
     for (const Known& each : known) {
       const auto& landmark = map.find(n[each.sighting])->belief;
@@ -459,6 +519,7 @@ template <LandmarkSensor L, class F>
 auto LandmarkMap<L, F>::candidates_of(const Gaussian<Pose>& x, const Observation& z) const -> Candidates {
   check(z);
   Candidates all(z.size());
+  const std::vector<std::uint32_t> near = is_placed ? std::vector<std::uint32_t>{} : in_reach(x.mean);
   for (std::size_t k = 0; k < z.size(); ++k) {
     Alternatives& of = all[k];
     of.is_named = z[k].identity.has_value();
@@ -470,7 +531,7 @@ auto LandmarkMap<L, F>::candidates_of(const Gaussian<Pose>& x, const Observation
     if (is_of_the_map)
       add(*z[k].identity);
     else if (!of.is_named)
-      for_each_near(x, z[k].z, add);
+      for_each_near(x, z[k].z, near, add);
     const bool is_new = !is_of_the_map && begins(z[k].z) &&
                         (of.is_named || options().new_density >= options().clutter_density);
     of.otherwise.landmark = is_new ? new_landmark : no_landmark;
@@ -482,13 +543,26 @@ auto LandmarkMap<L, F>::candidates_of(const Gaussian<Pose>& x, const Observation
   return all;
 }
 
+/// Landmarks without a place that the sensor does not rule out from here, whatever it sees.
+template <LandmarkSensor L, class F>
+std::vector<std::uint32_t> LandmarkMap<L, F>::in_reach(const Pose& x) const {
+  std::vector<std::uint32_t> numbers;
+  for_each([&](std::uint32_t number, const MappedLandmark<Landmark>& landmark) {
+    if constexpr (requires(const L& l) { l.in_reach(x, landmark.belief.mean); })
+      if (!common_->sensor.in_reach(x, landmark.belief.mean)) return;
+    numbers.push_back(number);
+  });
+  return numbers;
+}
+
 /// Landmarks that a sighting from here may be of. Of a landmark inside the gate each number of its place
 /// differs from the sighting's by no more than the gate's root times the sum of both standard deviations.
 template <LandmarkSensor L, class F>
 template <class Visit>
-void LandmarkMap<L, F>::for_each_near(const Gaussian<Pose>& x, const Measurement& z, Visit&& visit) const {
+void LandmarkMap<L, F>::for_each_near(const Gaussian<Pose>& x, const Measurement& z,
+                                      const std::vector<std::uint32_t>& near, Visit&& visit) const {
   if constexpr (!is_placed) {
-    for_each([&](std::uint32_t number, const auto&) { visit(number); });
+    for (const std::uint32_t number : near) visit(number);
   } else {
     const Landmark place = common_->sensor.initialise(x.mean, z);
     const auto& model = detail::model_of(common_->sensor, z);

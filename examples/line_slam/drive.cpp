@@ -1,0 +1,56 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "drive.hpp"
+
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include <cairn/core/check.hpp>
+#include <cairn/core/parallel.hpp>
+#include <cairn/core/random.hpp>
+
+namespace line_slam {
+
+namespace {
+
+using cairn::SE3;
+using cairn::Vector;
+
+/// Standard deviations of a step of so many metres, in the camera's axes.
+cairn::Matrix<6> noise_of(const DriveOptions& o, double metres) {
+  const double slip = o.slip * metres, turn = o.turn * metres, tilt = o.tilt * metres;
+  Vector<6> sigma;
+  sigma << slip, slip / 3, slip, tilt, turn, tilt;  // the y axis is the vertical
+  return sigma.cwiseAbs2().asDiagonal();
+}
+
+}  // namespace
+
+Drive simulated_drive(const DriveOptions& o) {
+  if (!(o.metres > 0 && o.metres <= 100000) || !(o.step >= 0.05 && o.step <= 5))
+    cairn::raise("line_slam: expected a drive of up to 100 km in steps of 0.05 to 5 m");
+  Drive drive{.options = o, .campus = Campus(o.seed)};
+  drive.truth = Campus::drive(o.metres, o.step);
+  drive.frames.resize(drive.truth.size());
+  cairn::parallel_for(drive.frames.size(), o.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t k = begin; k < end; ++k) {
+      cairn::Random random(o.seed, 1000 + k);
+      Frame& frame = drive.frames[k];
+      if (k > 0) {
+        const SE3 moved = drive.truth[k - 1].inverse() * drive.truth[k];
+        const cairn::Matrix<6> noise = noise_of(o, moved.translation().norm());
+        const Vector<6> error = cairn::sample(cairn::Gaussian<Vector<6>>{Vector<6>::Zero(), noise}, random);
+        frame.moved = {cairn::retract(moved, error), noise};
+      } else {
+        frame.moved = {SE3(), 1e-12 * cairn::Matrix<6>::Identity()};
+      }
+      frame.detections = detect(drive.campus, drive.rig, drive.truth[k], o.detector, random);
+      for (LineSighting& sighting : match(drive.rig, frame.detections, o.matching))
+        frame.seen.push_back({std::move(sighting), {}});
+    }
+  });
+  return drive;
+}
+
+}  // namespace line_slam

@@ -1,0 +1,89 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+// The program as a user meets it: its exit code, its words and what it leaves behind.
+#include "support/program.hpp"
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <set>
+#include <string>
+
+#include <doctest/doctest.h>
+#include <nlohmann/json.hpp>
+
+#include <cairn/io/file.hpp>
+#include <cairn/io/trajectory.hpp>
+#include <cairn/version.hpp>
+
+#include "support/folder.hpp"
+#include "support/program_checks.hpp"
+
+namespace line_program_test {
+namespace {
+
+namespace fs = std::filesystem;
+using cairn_test::names_in;
+using cairn_test::Outcome;
+
+const std::string program = LINE_SLAM_PROGRAM;
+
+Outcome run(const std::string& arguments, const std::string& standard_output = "") {
+  return cairn_test::run_program("\"" + program + "\" " + arguments, standard_output);
+}
+
+const std::set<std::string> results =
+    cairn_test::with_report({"lines.csv", "trajectory.txt", "summary.json", "timing.json"});
+
+}  // namespace
+
+TEST_SUITE("line_slam/program") {
+  TEST_CASE("line_slam: a mistake is exit code 2 and a line") {
+    const cairn_test::Folder folder;
+    const std::string out = " --out \"" + (folder / "out").string() + "\"";
+    cairn_test::check_mistakes([&](const std::string& mistake) { return run(mistake + out); },
+                               {"--nonsense", "--particles 0", "--particles many", "--threads 0", "--seed -1",
+                                "--metres 0", "--metres nan", "--quiet=perhaps", "more words"});
+    CHECK_FALSE(fs::exists(folder / "out"));
+    folder.put("file", "");
+    CHECK(run("--out \"" + (folder / "file").string() + "\"").code == 2);
+  }
+
+  TEST_CASE("line_slam: --version and --help say what they are asked, or that they cannot") {
+    cairn_test::check_version_and_help(run, "line_slam " CAIRN_VERSION_STRING "\n", "--metres");
+  }
+
+  TEST_CASE("line_slam: the same seed gives the same bytes but for times, and the files are what they say") {
+    const cairn_test::Folder folder;
+    for (const std::string threads : {"1", "2", "7"}) {
+      const Outcome outcome =
+          run("--particles 5 --metres 15 --seed 5 --threads " + threads + (threads == "7" ? " --quiet" : "") +
+              " --out \"" + (folder / threads).string() + "\"");
+      CAPTURE(outcome.words);
+      REQUIRE(outcome.code == 0);
+      CHECK(outcome.says("frames 100 %") == (threads != "7"));
+      CHECK(names_in(folder / threads) == results);
+    }
+    cairn_test::check_same_bytes(folder / "1", folder / "2", results);
+    cairn_test::check_same_bytes(folder / "1", folder / "7", results);
+    const auto summary = nlohmann::json::parse(cairn::read_file(folder / "1" / "summary.json"));
+    CHECK(summary["frames"] == 21);
+    CHECK(summary["particles"] == 5);
+    CHECK(cairn::read_tum(folder / "1" / "trajectory.txt").size() == 21);
+    const std::string lines = cairn::read_file(folder / "1" / "lines.csv");
+    CHECK(std::count(lines.begin(), lines.end(), '\n') == 1 + summary["slam"]["lines"].get<int>());
+  }
+
+  TEST_CASE("line_slam: interrupted, it writes the frames until then") {
+    const cairn_test::Folder folder;
+    CHECK(cairn_test::interrupt_program(
+              {program, "--particles", "2000", "--metres", "60", "--out", (folder / "out").string()},
+              {SIGTERM}, 1) == 4);
+    CHECK(names_in(folder / "out") == results);
+    const auto summary = nlohmann::json::parse(cairn::read_file(folder / "out" / "summary.json"));
+    CHECK(summary["ended_early"].get<std::string>().find("interrupted (SIGTERM)") == 0);
+  }
+}
+
+}  // namespace line_program_test
