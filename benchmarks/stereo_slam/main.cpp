@@ -218,13 +218,13 @@ void add(Scoreboard& board, Row row, const std::optional<double>& measured, bool
 }
 
 /// Mean NEES of the poses from a frame on, whose truth is taken for the world's beginning.
-std::optional<double> nees_from(const stereo_slam::RunRecord& run, std::size_t first) {
-  const stereo_slam::FrameRecord& begin = run.frames.at(first);
+std::optional<double> nees_from(const stereo_slam::RunRecord& record, std::size_t first) {
+  const stereo_slam::FrameRecord& begin = record.frames.at(first);
   if (!begin.truth) return std::nullopt;
   const cairn::SE3 T_estimate_truth = begin.T_world_camera * begin.truth->inverse();
   double sum = 0, count = 0;
-  for (std::size_t i = first + 1; i < run.frames.size(); ++i) {
-    stereo_slam::FrameRecord frame = run.frames[i];
+  for (std::size_t i = first + 1; i < record.frames.size(); ++i) {
+    stereo_slam::FrameRecord frame = record.frames[i];
     if (frame.truth) frame.truth = T_estimate_truth * *frame.truth;
     if (const auto nees = stereo_slam::pose_nees(frame)) {
       sum += *nees;

@@ -179,7 +179,9 @@ void Pipeline::choose_calibration() {
   }
   if (!record.on || options_.calibrate == Calibration::drifting) return;
   cairn::KeyframeMapOptions with_rig = map_options(options_);
-  with_rig.rig = options_.rig;
+  // The map takes pixels for independent and multiplies its covariances by how much they are not. What is
+  // known beforehand of the rig is put on the same scale.
+  with_rig.rig = options_.rig.scaled(1 / std::sqrt(NoiseFactors::moving));
   map_ = cairn::KeyframeMap(rig_, with_rig);
 }
 

@@ -64,15 +64,11 @@ struct PipelineOptions {
   StereoMatcherOptions stereo;
 
   Calibration calibrate = Calibration::automatic;
-  /// How far a rig may be off, where it is estimated with the map: what calibrations of recorded rigs are
-  /// found to differ by from one another.
-  cairn::RigSigmas rig = {.rotation = 5e-4,
-                          .direction = 5e-4,
-                          .length = 1e-3,
-                          .focal = 2.5e-3,
-                          .focal_ratio = 2.5e-3,
-                          .centre = 2e-3,
-                          .right_centre = 2e-3};
+  /// How far a rig may be off, where it is estimated with the map. The length stands for all that makes the
+  /// world larger or smaller: no image shows it, and it only widens the covariance. Focal lengths and
+  /// principal points are left as they are given: freed, they take up what lenses do besides
+  /// (docs/design.md).
+  cairn::RigSigmas rig = {.rotation = 5e-4, .direction = 5e-4, .length = 3e-3};
   cairn::CalibrationDriftOptions calibration = {
       .initial_sigma = 2e-4, .walk_rotation = 1e-5, .walk_baseline = 1e-6};
 

@@ -153,8 +153,8 @@ inline std::vector<ArenaFrame> street_frames(std::uint64_t seed, int count, doub
 
 /// What became of a run.
 struct ArenaRun {
-  cairn::Vector<6> last_error;  ///< of the last pose that was found, its own axes
-  cairn::Matrix<6> last_covariance;
+  cairn::Vector<6> last_error = cairn::Vector<6>::Zero();  ///< of the last pose that was found, its own axes
+  cairn::Matrix<6> last_covariance = cairn::Matrix<6>::Zero();
   std::vector<double> nees;
   std::vector<std::size_t> keyframes;  ///< after each frame
   double rms_position = 0;

@@ -55,6 +55,14 @@ struct RigSigmas {
     return sigmas;
   }
   [[nodiscard]] bool known() const { return each().isZero(0); }
+  /// All of them multiplied.
+  [[nodiscard]] RigSigmas scaled(double factor) const {
+    RigSigmas result = *this;
+    for (double* sigma : {&result.rotation, &result.direction, &result.length, &result.focal,
+                          &result.focal_ratio, &result.centre, &result.right_centre})
+      *sigma *= factor;
+    return result;
+  }
   /// A diagonal covariance; what is known exactly has 1e-9 squared, so that it is one.
   [[nodiscard]] Matrix<rig_numbers> covariance() const {
     constexpr double least = 1e-9;
