@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <optional>
@@ -16,11 +17,16 @@
 #include <thread>
 #include <vector>
 
+#include <malloc.h>
+
 #include <cairn/core/random.hpp>
 #include <cairn/core/statistics.hpp>
+#include <cairn/index/shared_kd_tree.hpp>
 
 #include "batch.hpp"
 #include "ekf_slam.hpp"
+#include "lines.hpp"
+#include "shared_buckets.hpp"
 #include "slam.hpp"
 #include "support/data.hpp"
 #include "support/scoreboard.hpp"
@@ -267,6 +273,80 @@ void add_index(Scoreboard& board) {
   }
 }
 
+/// What an index costs a step of a hundred particles: each copies it, looks for what is near a place, and
+/// files one landmark anew.
+struct IndexCost {
+  double microseconds = 0;  ///< for one particle
+  double bytes = 0;         ///< that the copy has of its own
+  std::uint64_t found = 0;  ///< sum of what the boxes hold: the same for all
+};
+template <class Index>
+IndexCost index_cost(std::uint32_t landmarks) {
+  using Clock = std::chrono::steady_clock;
+  using Point = typename Index::Point;
+  constexpr std::size_t particles = 100;
+  const double reach = 5 * std::sqrt(static_cast<double>(landmarks));  // a landmark on 100 m^2
+  cairn::Random random(1);
+  std::vector<Point> places;
+  Index index;
+  for (std::uint32_t i = 0; i < landmarks; ++i) {
+    places.push_back({random.uniform(-reach, reach), random.uniform(-reach, reach)});
+    index.insert(places.back(), i);
+  }
+  IndexCost cost;
+  std::vector<double> times;
+  for (int round = 0; round < 11; ++round) {
+    const auto number = static_cast<std::uint32_t>(random.below(landmarks));
+    const Point at = places[number], to{at[0] + 0.7, at[1] - 0.4};
+    std::vector<Index> copies;
+    copies.reserve(particles);
+    const auto before = ::mallinfo2();
+    const auto begin = Clock::now();
+    for (std::size_t i = 0; i < particles; ++i) {
+      copies.push_back(index);
+      Index& copy = copies.back();
+      copy.for_each_in_box({at[0] - 3, at[1] - 3}, {at[0] + 3, at[1] + 3},
+                           [&](std::uint32_t id, const Point&) { cost.found += id; });
+      copy.erase(at, number);
+      copy.insert(to, number);
+    }
+    times.push_back(1e6 * std::chrono::duration<double>(Clock::now() - begin).count() / particles);
+    const auto after = ::mallinfo2();
+    cost.bytes = static_cast<double>(after.uordblks + after.hblkhd - before.uordblks - before.hblkhd) /
+                 static_cast<double>(particles);
+  }
+  cost.microseconds = median(times);
+  return cost;
+}
+
+void add_index_rivals(Scoreboard& board) {
+  for (const std::uint32_t n : {100U, 1000U, 10000U, 50000U}) {
+    const IndexCost tree = index_cost<cairn::SharedKdTree<2>>(n), buckets = index_cost<SharedBuckets>(n),
+                    plain = index_cost<PlainPoints>(n);
+    if (tree.found != buckets.found || tree.found != plain.found) {
+      std::cerr << "the indices do not find the same\n";
+      std::exit(1);
+    }
+    const std::string title = "index of " + std::to_string(n) + ", a particle: copied, asked, one filed anew";
+    const auto note = [](const char* unit, double bucket, double copy) {
+      return "shared buckets " + std::to_string(bucket) + unit + ", plain copies " + std::to_string(copy) +
+             unit;
+    };
+    board.add({.name = title + ": time, shared kd-tree",
+               .measured = tree.microseconds,
+               .unit = "us",
+               .rival = std::min(buckets.microseconds, plain.microseconds),
+               .rival_name = buckets.microseconds < plain.microseconds ? "shared buckets" : "plain copies",
+               .note = note(" us", buckets.microseconds, plain.microseconds)});
+    board.add({.name = "the same: memory of its own",
+               .measured = tree.bytes,
+               .unit = "bytes",
+               .rival = std::min(buckets.bytes, plain.bytes),
+               .rival_name = buckets.bytes < plain.bytes ? "shared buckets" : "plain copies",
+               .note = note(" bytes", buckets.bytes, plain.bytes)});
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -276,5 +356,7 @@ int main(int argc, char** argv) {
   add_park(board);
   add_nees(board);
   add_index(board);
+  add_index_rivals(board);
+  add_lines(board);
   return board.finish();
 }
