@@ -43,7 +43,7 @@ const Belief start{SE2(0, -4, 0), Vector<3>(0.04, 0.04, 0.0025).asDiagonal()};
 struct Robot : cairn::Unicycle {
   bool transposed = false, exchanged = false;  // mistakes
   [[nodiscard]] cairn::Matrix<3> jacobian(const SE2& pose, const Vector<2>& u, double step) const {
-    cairn::Matrix<3> g = Unicycle::jacobian(pose, u, step);
+    cairn::Matrix<3> g = cairn::Unicycle::jacobian(pose, u, step);
     if (transposed) g = g.transpose().eval();
     if (exchanged) std::swap(g(0, 2), g(1, 2));
     return g;

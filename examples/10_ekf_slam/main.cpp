@@ -42,7 +42,7 @@ struct Slam {
 
   struct Transposed : cairn::Unicycle {
     Matrix<3> jacobian(const SE2& x, const Vector<2>& u, double dt) const {
-      return Unicycle::jacobian(x, u, dt).transpose();
+      return cairn::Unicycle::jacobian(x, u, dt).transpose();
     }
   };
 
