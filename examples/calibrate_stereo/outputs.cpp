@@ -28,7 +28,7 @@ example::ResultFolder results_in(const std::filesystem::path& folder) {
   return {folder, {"rig.yaml", "summary.json", "report.html"}};
 }
 
-std::array<double, 9> numbers_of(const cairn::PinholeCamera& camera) {
+std::array<double, 9> parameters_of(const cairn::PinholeCamera& camera) {
   const cairn::PinholeParameters& p = camera.parameters();
   return {p.fx, p.fy, p.cx, p.cy, p.k1, p.k2, p.p1, p.p2, p.k3};
 }
@@ -49,7 +49,7 @@ std::string summary(const Results& r) {
   json["baseline_m"] = {{"value", c.rig.rig.baseline()}, {"sigma", c.baseline_sigma}};
   for (const bool left : {true, false}) {
     Json& camera = json[left ? "left" : "right"];
-    const auto numbers = numbers_of(left ? c.rig.rig.left : c.rig.rig.right);
+    const auto numbers = parameters_of(left ? c.rig.rig.left : c.rig.rig.right);
     for (std::size_t i = 0; i < names.size(); ++i)
       camera[names[i]] = {{"value", numbers[i]}, {"sigma", sigma_of(left ? c.rig.left : c.rig.right, i)}};
   }
@@ -71,7 +71,7 @@ example::Table number_table(const BoardCalibration& c) {
                        .caption = "Estimates with their standard deviations. Pixels, radians, metres.",
                        .columns = {"", "left", "sigma", "right", "sigma"},
                        .rows = {}};
-  const auto left = numbers_of(c.rig.rig.left), right = numbers_of(c.rig.rig.right);
+  const auto left = parameters_of(c.rig.rig.left), right = parameters_of(c.rig.rig.right);
   for (std::size_t i = 0; i < names.size(); ++i)
     table.rows.push_back({names[i], readable(left[i], 6), readable(sigma_of(c.rig.left, i), 2),
                           readable(right[i], 6), readable(sigma_of(c.rig.right, i), 2)});

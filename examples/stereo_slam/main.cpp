@@ -253,7 +253,9 @@ int main(int argc, char** argv) {
       given = example::read_rig(arguments.dataset.camera);
       given.rig = frames->rig();  // which knows the size of its images
       // What was calibrated well may have come loose since: never surer than by default.
-      arguments.pipeline.rig_sigma = std::max(arguments.pipeline.rig_sigma, given.angle_sigma().value_or(0));
+      cairn::RigSigmas& rig = arguments.pipeline.rig;
+      rig.rotation = std::max(rig.rotation, given.angle_sigma().value_or(0));
+      rig.direction = std::max(rig.direction, given.angle_sigma().value_or(0));
     }
     stereo_slam::prepare_output_folder(arguments.out);
     arguments.pipeline.sample_frame = frames->size() / 2;

@@ -594,7 +594,9 @@ RunRecord Pipeline::record() {
   record.corrected = corrected_path();
   if (const auto rig = map_.rig_correction()) {
     record.calibration.numbers = rig->mean;
-    record.calibration.sigmas = rig->covariance.diagonal().cwiseSqrt();
+    const cairn::RigState before = options_.rig.each();
+    for (int i = 0; i < cairn::rig_numbers; ++i)  // what is held to be known was not estimated
+      record.calibration.sigmas(i) = before(i) > 0 ? std::sqrt(rig->covariance(i, i)) : 0;
   } else if (options_.calibrate == Calibration::drifting) {
     record.calibration.numbers.head<5>() = calibration_.drift().state();
     record.calibration.sigmas.head<5>() = calibration_.drift().covariance().diagonal().cwiseSqrt();
