@@ -53,19 +53,19 @@ public:
 
   /// Forgets what was taken and provides room for `numbers` in all, each piece rounded up to whole lines.
   void open(std::size_t numbers) {
-    const std::size_t lines = numbers / Line<S>::count + 1;
+    const std::size_t lines = numbers / CacheLine<S>::count + 1;
     if (lines_.size() < lines) lines_.resize(lines);
     used_ = 0;
   }
   [[nodiscard]] S* take(std::size_t numbers) {
     const std::size_t begin = used_;
-    used_ += (numbers + Line<S>::count - 1) / Line<S>::count;
+    used_ += (numbers + CacheLine<S>::count - 1) / CacheLine<S>::count;
     CAIRN_ASSERT(used_ <= lines_.size(), "the workspace is as large as its pieces");
     return lines_[begin].numbers;
   }
 
 private:
-  std::vector<Line<S>> lines_;
+  std::vector<CacheLine<S>> lines_;
   std::size_t used_ = 0;
 };
 

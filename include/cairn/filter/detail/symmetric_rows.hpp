@@ -23,26 +23,26 @@ namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
 /// Numbers of one cache line.
 template <class S>
-struct alignas(64) Line {
+struct alignas(64) CacheLine {
   static constexpr int count = static_cast<int>(64 / sizeof(S));
   S numbers[static_cast<std::size_t>(count)];
 };
 
 /// The widest register of the target, for whole lines of S.
 template <class S>
-using LineLane = typename RegisterOf<S, lane_bytes<Line<S>::count, S>>::type;
+using CacheLineLane = typename RegisterOf<S, lane_bytes<CacheLine<S>::count, S>>::type;
 
 /// Rows of numbers that begin on a line and are zero in the padding, `stride` numbers apart.
 template <class S>
 [[nodiscard]] constexpr std::size_t padded(int numbers) {
-  constexpr int line = Line<S>::count;
+  constexpr int line = CacheLine<S>::count;
   return static_cast<std::size_t>((numbers + line - 1) / line) * line;
 }
 
 /// to[0 .. count) += factor * from, count in whole lines.
 template <class S>
 void add_scaled(S* to, const S* from, S factor, std::size_t count) {
-  using Lane = LineLane<S>;
+  using Lane = CacheLineLane<S>;
   for (std::size_t i = 0; i < count; i += sizeof(Lane) / sizeof(S)) {
     Lane sum, term;
     std::memcpy(&sum, to + i, sizeof(Lane));
@@ -63,7 +63,7 @@ class SymmetricRows {
   static_assert(std::is_floating_point_v<S>, "a growing covariance is of float or double");
 
 public:
-  static constexpr int line = Line<S>::count;
+  static constexpr int line = CacheLine<S>::count;
 
   [[nodiscard]] int size() const noexcept { return size_; }
 
@@ -73,7 +73,7 @@ public:
     size_ = rows;
   }
   void make_room(int rows) { room_for(lines_, lines_before(rows)); }
-  [[nodiscard]] std::size_t bytes() const noexcept { return lines_.capacity() * sizeof(Line<S>); }
+  [[nodiscard]] std::size_t bytes() const noexcept { return lines_.capacity() * sizeof(CacheLine<S>); }
 
   /// Columns 0 to i of row i.
   [[nodiscard]] S* row(int i) noexcept { return lines_[lines_before(i)].numbers; }
@@ -176,7 +176,7 @@ public:
   }
 
 private:
-  using Lane = LineLane<S>;
+  using Lane = CacheLineLane<S>;
   static constexpr int width = static_cast<int>(sizeof(Lane) / sizeof(S));
   static constexpr std::size_t index(int i) { return static_cast<std::size_t>(i); }
 
@@ -239,7 +239,7 @@ private:
     });
   }
 
-  std::vector<Line<S>> lines_;
+  std::vector<CacheLine<S>> lines_;
   int size_ = 0;
 };
 
