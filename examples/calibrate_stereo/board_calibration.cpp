@@ -192,16 +192,19 @@ double epipolar_rms(const BoardView& view, const cairn::StereoRig& rig) {
   return std::sqrt(sum / static_cast<double>(view.left.size()));
 }
 
+[[noreturn]] void refuse_views() {
+  cairn::raise(
+      "the views do not determine the calibration; expected the board tilted in several directions, near "
+      "and far, and in all parts of the images");
+}
+
 /// The inverse of J^T J, scaled to a unit diagonal for the test of its rank.
 Dense covariance_of(const Dense& A) {
   const Column scale = A.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
   const Dense scaled = scale.asDiagonal() * A * scale.asDiagonal();
   const Eigen::LDLT<Dense> factor(scaled);
   constexpr double least = 1e-11;
-  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > least))
-    cairn::raise(
-        "the views do not determine the calibration; expected the board tilted in several directions, near "
-        "and far, and in all parts of the images");
+  if (factor.info() != Eigen::Success || !(factor.vectorD().minCoeff() > least)) refuse_views();
   return scale.asDiagonal() * factor.solve(Dense::Identity(A.rows(), A.cols())) * scale.asDiagonal();
 }
 
@@ -277,6 +280,13 @@ BoardCalibration calibrate(std::span<const cairn::Vector<3>> board, std::span<co
     cairn::raise("the calibration found no minimum; expected views of one rigid board by one rigid rig");
   const double variance = cost / static_cast<double>(residuals - static_cast<std::size_t>(layout.size()));
   const Column sigmas = (variance * inverse.diagonal()).cwiseMax(0.0).cwiseSqrt();
+  // Noise tilts boards that were held parallel to the images, and the equations have full rank by that alone.
+  constexpr double most = 0.05;  // a focal length's sigma, relative
+  for (const auto& [camera, first] :
+       {std::pair{&state.rig.left, 0}, std::pair{&state.rig.right, layout.camera()}}) {
+    const cairn::PinholeParameters& p = camera->parameters();
+    if (!(sigmas(first) < most * p.fx) || !(sigmas(first + 1) < most * p.fy)) refuse_views();
+  }
   result.pixel_sigma = std::sqrt(variance);
   result.rms = std::sqrt(cost / static_cast<double>(2 * views.size() * board.size()));
   result.rig.rig = state.rig;

@@ -181,7 +181,7 @@ double distance(const cairn::SE3& a, const cairn::SE3& b) {
 TEST_SUITE("dataset") {
   TEST_CASE("dataset: an unknown kind and a folder that is none are refused in words") {
     CHECK(refusal("video", "/") ==
-          "there is no kind of data set 'video'; expected arena, kitti_odometry, kitti_raw or euroc");
+          "there is no kind of data set 'video'; expected arena, kitti_odometry, kitti_raw, euroc or images");
     const cairn_test::Folder folder;
     folder.put("file", "");
     for (const char* kind : {"kitti_odometry", "kitti_raw", "euroc"}) {

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include "support/result_folder.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <csignal>
 #include <cstdint>
@@ -82,7 +83,12 @@ int kill_writers(const Folder& folder, bool foreign) {
   const fs::path out = folder / "out";
   constexpr std::size_t size = 100000;
   const example::ResultFolder writer(out, results);
+  const auto begin = std::chrono::steady_clock::now();
   writer.replace([&](const fs::path& staging) { fill(staging, 0, size); });
+  const auto one = std::chrono::steady_clock::now() - begin;
+  // Time for a few of them, also on a busy machine.
+  const auto longest = static_cast<std::uint64_t>(
+      std::max<std::int64_t>(9000, 6 * std::chrono::duration_cast<std::chrono::microseconds>(one).count()));
   if (foreign) add_foreign(out);
   int parts = 0, last = 0;
   for (int kill = 0; kill < 60; ++kill) {
@@ -92,7 +98,7 @@ int kill_writers(const Folder& folder, bool foreign) {
       for (int run = last + 1;; ++run)
         writer.replace([&](const fs::path& staging) { fill(staging, run, size); });
     }
-    std::this_thread::sleep_for(std::chrono::microseconds(random.below(9000)));
+    std::this_thread::sleep_for(std::chrono::microseconds(random.below(longest)));
     ::kill(child, SIGKILL);
     int status = 0;
     REQUIRE(::waitpid(child, &status, 0) == child);

@@ -232,7 +232,7 @@ TEST_SUITE("rig_file") {
     if (!data) return;
     const std::string cameras =
         cairn::read_file(*data / "opencv-chessboard-stereo" / "intrinsics.yml", "a calibration");
-    CHECK(says(refusal(cameras), "lacks the field R;"));
+    CHECK(says(refusal(cameras), "lacks the field T;"));
     const std::size_t motion = opencv.find("\nR:") + 1;
     const example::CalibratedRig rig = example::parse_rig(cameras + opencv.substr(motion), "both");
     CHECK(rig.rig.left.fx() == 534.80326845051309);
