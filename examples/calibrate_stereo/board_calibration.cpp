@@ -276,8 +276,6 @@ BoardCalibration calibrate(std::span<const cairn::Vector<3>> board, std::span<co
   }
   normal_equations(board, views, state, layout, A, b);
   const Dense inverse = covariance_of(A);
-  if (!settled)
-    cairn::raise("the calibration found no minimum; expected views of one rigid board by one rigid rig");
   const double variance = cost / static_cast<double>(residuals - static_cast<std::size_t>(layout.size()));
   const Column sigmas = (variance * inverse.diagonal()).cwiseMax(0.0).cwiseSqrt();
   // Noise tilts boards that were held parallel to the images, and the equations have full rank by that alone.
@@ -287,6 +285,8 @@ BoardCalibration calibrate(std::span<const cairn::Vector<3>> board, std::span<co
     const cairn::PinholeParameters& p = camera->parameters();
     if (!(sigmas(first) < most * p.fx) || !(sigmas(first + 1) < most * p.fy)) refuse_views();
   }
+  if (!settled)
+    cairn::raise("the calibration found no minimum; expected views of one rigid board by one rigid rig");
   result.pixel_sigma = std::sqrt(variance);
   result.rms = std::sqrt(cost / static_cast<double>(2 * views.size() * board.size()));
   result.rig.rig = state.rig;
