@@ -123,7 +123,7 @@ TEST_SUITE("grid_slam/program") {
         run("--threads 3 --load " + named("begin.map") + log_and_out("end") + " --save " + named("end.map"))
             .code == 0);
     for (const std::string& name : results()) {
-      if (name == "timing.json") continue;
+      if (name == "timing.json" || name == "report.html") continue;  // its film begins with the second run
       CAPTURE(name);
       CHECK(cairn::read_file(folder / "out_whole" / name) == cairn::read_file(folder / "out_end" / name));
     }
