@@ -89,9 +89,9 @@ TEST_SUITE("scan/match") {
                      0.4 + random.uniform(-0.01, 0.01));
       const ScanLikelihood at = evaluate(grid, points, pose, model);
       REQUIRE(at.log_likelihood == doctest::Approx(log_likelihood(grid, points, pose, model)).epsilon(1e-6));
-      // Points that cross into another cell step by the field's rounding, and the sum is of single precision:
-      // most trials agree, not all; of a wrong gradient hardly any would.
-      const double h = 1e-5;  // below, single precision shows
+      // Points that cross into another cell step to another obstacle, the more of them the larger the step
+      // is: most trials agree, not all.
+      const double h = 2e-6;
       for (int k = 0; k < 3; ++k) {
         Vector<3> d = Vector<3>::Zero();
         d(k) = h;
@@ -101,7 +101,7 @@ TEST_SUITE("scan/match") {
         near += std::abs(slope - at.gradient(k)) < 1e-3 * (1 + at.gradient.norm());
       }
     }
-    CHECK(near > 120);  // of 180
+    CHECK(near > 160);  // of 180
   }
 
   TEST_CASE("match: never worse than its start, and finite far from any map") {

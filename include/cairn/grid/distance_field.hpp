@@ -59,11 +59,16 @@ public:
   static constexpr double largest_radius = 16;  ///< cells
   static constexpr int normal_reach = 2;        ///< cells to either side whose points make a line
 
+  /// Throws Error where no field looks so far.
+  static void expect_radius(double radius) {
+    if (!(radius > 0 && radius <= largest_radius))
+      raise("DistanceField: expected a radius above 0 and up to 16 cells");
+  }
+
   /// A field that looks `radius` cells far, above 0 and at most 16. Throws Error.
   DistanceField(const SharedTiles<Cell>& cells, double radius)
       : cells_(&cells), radius_(static_cast<float>(radius)), nearest_(slots), normals_(slots / 4) {
-    if (!(radius > 0 && radius <= largest_radius))
-      raise("DistanceField: expected a radius above 0 and up to 16 cells");
+    expect_radius(radius);
   }
 
   [[nodiscard]] double radius() const noexcept { return static_cast<double>(radius_); }

@@ -88,7 +88,7 @@ public:
     if (!(geometry_.cell_size > 0) || !std::isfinite(geometry_.cell_size) ||
         !std::isfinite(geometry_.origin_x) || !std::isfinite(geometry_.origin_y))
       raise("OccupancyGrid: expected a cell size above zero and a finite origin");
-    static_cast<void>(field());  // refuses a radius out of range
+    Field::expect_radius(field_radius_);
   }
 
   /// The grid again whose cells() these are, every one marked, with the same options: from a file.
