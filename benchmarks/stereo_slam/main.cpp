@@ -295,15 +295,7 @@ void add_return_row(Scoreboard& board) {
   const auto drive =
       run_drive("kitti_raw_0926", "kitti_raw", stereo_slam::Calibration::automatic, /*and_back=*/true);
   std::optional<double> off;
-  if (drive) {
-    const std::vector<stereo_slam::FrameRecord>& frames = drive->record.frames;
-    double path = 0;
-    for (std::size_t i = 1; i < frames.size(); ++i)
-      path += (frames[i].T_world_camera.translation() - frames[i - 1].T_world_camera.translation()).norm();
-    off = 100 *
-          (frames.back().T_world_camera.translation() - frames.front().T_world_camera.translation()).norm() /
-          path;
-  }
+  if (drive) off = stereo_slam::return_error(drive->record.frames).percent();
   add(board,
       {.name = "kitti_raw_0926 forwards then backwards: off the start, over the path",
        .unit = "%",

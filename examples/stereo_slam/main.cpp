@@ -205,16 +205,9 @@ void print_summary(const stereo_slam::RunRecord& record) {
 
 /// How far a drive there and back ends from where it began.
 void print_return(const stereo_slam::RunRecord& record) {
-  double path = 0;
-  for (std::size_t i = 1; i < record.frames.size(); ++i)
-    path +=
-        (record.frames[i].T_world_camera.translation() - record.frames[i - 1].T_world_camera.translation())
-            .norm();
-  const cairn::SE3 left =
-      record.frames.front().T_world_camera.inverse() * record.frames.back().T_world_camera;
+  const stereo_slam::ReturnError error = stereo_slam::return_error(record.frames);
   std::printf("back at the start: %.4f m off after %.1f m (%.3f %%), turned by %.3f degrees\n",
-              left.translation().norm(), path, path > 0 ? 100 * left.translation().norm() / path : 0.0,
-              left.rotation().angle() * stereo_slam::degrees);
+              error.distance, error.path, error.percent(), error.angle * stereo_slam::degrees);
 }
 
 }  // namespace

@@ -26,8 +26,8 @@ void prepare_output_folder(const std::filesystem::path& folder);
 [[nodiscard]] std::optional<std::string> write_outputs(const RunRecord& run,
                                                        const std::filesystem::path& folder);
 
-/// The rig as a run believes it to be, which began with `given`: the same cameras, and where the right one
-/// stands with the sigmas of the run's calibration. The length of the baseline stays as it was given.
+/// The rig as a run believes it to be, which began with `given`, with the sigmas of the run's calibration: of
+/// where the right camera stands, and of the cameras' own numbers where those were estimated.
 [[nodiscard]] example::CalibratedRig learned_rig(const example::CalibratedRig& given, const RunRecord& run);
 
 /// trajectory_covariance.csv: a head line, then a line a frame: its number, time [s], whether it was tracked

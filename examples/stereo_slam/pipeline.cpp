@@ -236,7 +236,8 @@ void Pipeline::find_local_landmarks(const StereoFrame& frame) {
   }
 }
 
-/// The landmark of the map that looks like each local one, where one clearly does. (thesis 1.4: ratio test)
+/// The landmark of the map that looks like each local one, where one clearly does (ratio test: Lowe, IJCV
+/// 60, 2004, 7.1).
 std::vector<Pipeline::Match> Pipeline::match_with_map() const {
   std::vector<Look> looks;
   looks.reserve(locals_.size());

@@ -40,4 +40,15 @@ std::unique_ptr<Dataset> there_and_back(std::unique_ptr<Dataset> there) {
   return std::make_unique<ThereAndBack>(std::move(there));
 }
 
+ReturnError return_error(const std::vector<FrameRecord>& frames) {
+  ReturnError error;
+  for (std::size_t i = 1; i < frames.size(); ++i)
+    error.path +=
+        (frames[i].T_world_camera.translation() - frames[i - 1].T_world_camera.translation()).norm();
+  const cairn::SE3 left = frames.front().T_world_camera.inverse() * frames.back().T_world_camera;
+  error.distance = left.translation().norm();
+  error.angle = left.rotation().angle();
+  return error;
+}
+
 }  // namespace stereo_slam

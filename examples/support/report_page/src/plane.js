@@ -1,7 +1,8 @@
 // Curves in a plane, still or along a slider. uPlot draws the axes; its own paths want a common axis, so the curves are ours.
 import uPlot from 'uplot';
-import { colour, dashesOf, element, onResize, readable, switchable } from './dom.js';
+import { colour, dashesOf, element, onResize, switchable } from './dom.js';
 import { axisOptions, horizontal } from './plots.js';
+import { strip } from './strip.js';
 import { onTheme } from './theme.js';
 
 /** Smallest box around all curves. */
@@ -131,50 +132,10 @@ export function plane(panel, body) {
   view(panel, panel.curves, body);
 }
 
-/** Moves the slider on by itself, a whole film in about eight seconds, while the button is pressed. */
-export function playButton(slider) {
-  const button = element('button', { type: 'button' }, '▶ play');
-  let timer = 0;
-  const stop = () => {
-    clearInterval(timer);
-    timer = 0;
-    button.textContent = '▶ play';
-  };
-  const go = (to) => {
-    slider.value = to;
-    slider.dispatchEvent(new Event('input'));
-  };
-  button.addEventListener('click', () => {
-    if (timer !== 0) return stop();
-    const last = Number(slider.max);
-    if (Number(slider.value) === last) go(0);
-    button.textContent = '❚❚ pause';
-    timer = setInterval(() => {
-      if (Number(slider.value) < last) go(Number(slider.value) + 1);
-      else stop();
-    }, Math.min(Math.max(8000 / (last + 1), 40), 600));
-  });
-  slider.addEventListener('pointerdown', stop);
-  return button;
-}
-
 export function film(panel, body) {
-  const last = panel.frames.length - 1;
-  const slider = element('input', { type: 'range', min: 0, max: last, step: 1, value: panel.start, ariaLabel: panel.slider.label });
-  const place = element('output');
-  const caption = element('p', { className: 'frame' });
   const drawing = element('div');
-  body.append(element('div', { className: 'film' }, playButton(slider), slider, place), caption, drawing);
-
+  const apply = strip(panel, body, (frame) => show([...panel.still, ...frame.curves]));
+  body.append(drawing);
   const show = view(panel, [...panel.still, ...panel.frames.flatMap((frame) => frame.curves)], drawing);
-  const apply = () => {
-    const frame = panel.frames[slider.value];
-    const { label, unit } = panel.slider;
-    place.textContent = `${label} ${readable(frame.at)}${unit ? ` ${unit}` : ''}`;
-    slider.setAttribute('aria-valuetext', place.textContent);
-    caption.textContent = frame.caption;
-    show([...panel.still, ...frame.curves]);
-  };
-  slider.addEventListener('input', apply);
   apply();
 }
