@@ -175,7 +175,7 @@ void score_points(Scoreboard& board) {
   }
 }
 
-/// 64 numbers: the thesis's map. Queries are timed on a tenth of the 2000 and counted ten times.
+/// 64 numbers: a map of SURF descriptors. Queries are timed on a tenth of the 2000 and counted ten times.
 class DescriptorDrive {
 public:
   using Tree = cairn::KdTree<float, 64>;

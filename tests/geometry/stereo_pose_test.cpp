@@ -92,7 +92,7 @@ TEST_SUITE("stereo_pose") {
   }
 
   TEST_CASE(
-      "estimate_stereo_pose: simulated room, thesis camera: 1 mm, 0.02 degrees, and 4 mm among outliers") {
+      "estimate_stereo_pose: simulated room, 768 x 576 pixels: 1 mm, 0.02 degrees, and 4 mm among outliers") {
     const auto seed = cairn_test::seed();
     CAPTURE(seed);
     cairn::Random random(seed);

@@ -41,8 +41,8 @@ std::vector<Point> random_points(std::size_t count, cairn::Random& random) {
   return points;
 }
 
-/// The invariant of the thesis, on what is stored (erased points count until they are dropped): every tree is
-/// of another level.
+/// The invariant of one tree a level, on what is stored (erased points count until they are dropped): every
+/// tree is of another level.
 void check_invariant(const Index& index) {
   std::size_t below = 0;
   for (const std::size_t size : index.tree_sizes()) {
@@ -88,7 +88,8 @@ void run_program(const cairn::MultiTreeShape& shape) {
   CAPTURE(shape.growth);
   CAPTURE(static_cast<int>(shape.rule));
   CAPTURE(static_cast<int>(shape.merging));
-  const bool thesis = shape.rule == cairn::MergeRule::one_a_level && shape.merging == cairn::Merging::at_once;
+  const bool one_a_level =
+      shape.rule == cairn::MergeRule::one_a_level && shape.merging == cairn::Merging::at_once;
   cairn::Random random(seed, shape.growth);
   Index index(shape);
   std::map<cairn::PointId, Point> reference;
@@ -107,7 +108,7 @@ void run_program(const cairn::MultiTreeShape& shape) {
       reference.erase(victim);
     }
     REQUIRE(index.size() == reference.size());
-    if (thesis) check_invariant(index);
+    if (one_a_level) check_invariant(index);
     check_answers(index, reference, random);
   }
   index.finish_merges();
@@ -255,7 +256,7 @@ TEST_SUITE("multi_kd_tree") {
           run_program({.first_size = 20, .growth = growth, .rule = rule, .merging = merging});
   }
 
-  TEST_CASE("multi_kd_tree: there are no more trees than the thesis's bound, and one for the strict rule") {
+  TEST_CASE("multi_kd_tree: there are no more trees than log_q(n / n1) + 2, and one for the strict rule") {
     cairn::Random random(1);
     Index index({.first_size = 100, .growth = 4});
     for (int step = 0; step < 600; ++step) index.insert(random_points(10, random));

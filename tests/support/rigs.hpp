@@ -14,7 +14,8 @@
 
 namespace cairn_test {
 
-/// The rig of the thesis: 768 x 576 pixels, 40 degrees, 0.2 m apart.
+/// The rig of the stereo landmark system, as it was first published: 768 x 576 pixels, 40 degrees, 0.2 m
+/// apart.
 inline cairn::StereoRig rectified_rig(double baseline = 0.2) {
   const cairn::PinholeCamera camera(
       {.fx = 1055, .fy = 1055, .cx = 383.5, .cy = 287.5, .width = 768, .height = 576});

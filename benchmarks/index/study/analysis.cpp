@@ -111,7 +111,7 @@ Curves curves_of(const Stream& stream, const Drive& drive, const std::vector<dou
   return curves;
 }
 
-/// The thesis's estimates of a step at n points (section 4.1): the first tree rebuilt, the further ones
+/// The estimates of a step at n points: the first tree rebuilt, the further ones
 /// amortised.
 double theory_of_build(const Stream& stream, const Drive& drive, double n) {
   if (drive.growth == 0) return n * std::log(n);

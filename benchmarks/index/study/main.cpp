@@ -1,7 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 //
-// The study of the thesis's chapter 4: a set that grows, in one tree that is rebuilt, in multi-kd-trees of
+// What a set that grows costs: in one tree that is rebuilt, in multi-kd-trees of
 // several shapes, and in no tree at all.
 #include <algorithm>
 #include <array>

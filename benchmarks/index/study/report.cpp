@@ -108,7 +108,8 @@ void add_table(example::Report& report, const Study& study) {
   example::Table table{
       .title = study.stream.title + ": all stores",
       .caption =
-          "Exponents b of a cost that grows like n^b a step, measured / by the thesis's formula over the "
+          "Exponents b of a cost that grows like n^b a step, measured / by the formula of the amortised cost "
+          "over the "
           "same "
           "n. \"cheaper from\": n from which on all steps so far together cost less. Matches kept: share of "
           "the exact search's matches under the ratio test.",

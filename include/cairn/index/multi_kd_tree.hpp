@@ -3,7 +3,7 @@
 //
 /// @file
 /// A kd-tree that grows: a few static trees of geometrically growing size (the logarithmic method of Bentley
-/// and Saxe, "Decomposable searching problems I", J. Algorithms 1, 1980), with the thesis's rule.
+/// and Saxe, "Decomposable searching problems I", J. Algorithms 1, 1980), with one rule for all levels:
 ///
 ///   tree i holds at most n1 q^(i-1) points, and is empty or holds more than tree i - 1 may hold
 ///
