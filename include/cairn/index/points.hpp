@@ -305,9 +305,22 @@ struct PointPlace {
   std::size_t index;
 };
 
+/// The refusals of copy_point, out of line: compiled once, whatever the points are.
+[[noreturn, gnu::cold, gnu::noinline]] inline void refuse_dimension(const PointPlace& entry,
+                                                                    std::size_t found, std::size_t expected) {
+  raise(std::string(entry.what) + " " + std::to_string(entry.index) + " has " + std::to_string(found) +
+        " coordinates, expected " + std::to_string(expected));
+}
+[[noreturn, gnu::cold, gnu::noinline]] inline void refuse_coordinate(const PointPlace& entry,
+                                                                     std::size_t axis, double found,
+                                                                     const std::string& expected) {
+  raise(std::string(entry.what) + " " + std::to_string(entry.index) + ", coordinate " + std::to_string(axis) +
+        " is " + std::to_string(found) + ", expected " + expected);
+}
+
 /// What a coordinate must be, for the message of a refusal.
 template <class Scalar>
-[[nodiscard]] std::string usable_coordinates() {
+[[nodiscard, gnu::cold, gnu::noinline]] std::string usable_coordinates() {
   if constexpr (std::integral<Scalar>)
     return "a whole number from " + std::to_string(std::numeric_limits<Scalar>::min()) + " to " +
            std::to_string(std::numeric_limits<Scalar>::max());
@@ -333,9 +346,8 @@ template <class Scalar, class Number>
 /// number of usable size (for whole Scalars: not one of theirs) or the count is not `dim`.
 template <class Scalar, Point P>
 void copy_point(const P& point, std::size_t dim, Scalar* row, const PointPlace& entry) {
-  const auto where = [&] { return std::string(entry.what) + " " + std::to_string(entry.index); };
   if (const std::size_t size = size_of_point(point, dim); size != dim) [[unlikely]]
-    raise(where() + " has " + std::to_string(size) + " coordinates, expected " + std::to_string(dim));
+    refuse_dimension(entry, size, dim);
   bool usable = true;
   for (std::size_t axis = 0; axis < dim; ++axis)
     row[axis] = to_coordinate<Scalar>(number_at(point, axis), usable);
@@ -345,9 +357,8 @@ void copy_point(const P& point, std::size_t dim, Scalar* row, const PointPlace& 
     bool good = true;
     static_cast<void>(to_coordinate<Scalar>(number_at(point, axis), good));
     if (!good)
-      raise(where() + ", coordinate " + std::to_string(axis) + " is " +
-            std::to_string(static_cast<double>(number_at(point, axis))) + ", expected " +
-            usable_coordinates<Scalar>());
+      refuse_coordinate(entry, axis, static_cast<double>(number_at(point, axis)),
+                        usable_coordinates<Scalar>());
   }
 }
 

@@ -87,8 +87,9 @@ private:
     stage_ = todo_.empty() ? Stage::done : Stage::splitting;
   }
 
-  /// Splits one slot; returns how many points it has.
-  std::size_t split(const Slot& at, typename Points::Scratch& scratch) {
+  /// Splits one slot; returns how many points it has. Out of line, as its callers are many and compiling it
+  /// takes long.
+  [[gnu::noinline]] std::size_t split(const Slot& at, typename Points::Scratch& scratch) {
     const KdLayout& layout = parts_.layout;
     const Range leaves = layout.leaves_below(at.depth, at.slot);
     const std::size_t middle = layout.leaves_below(at.depth + 1, 2 * at.slot).end;
@@ -100,7 +101,7 @@ private:
   }
 
   /// Splits a slot down to its leaves.
-  void split_down(const Slot& at, typename Points::Scratch& scratch) {
+  [[gnu::noinline]] void split_down(const Slot& at, typename Points::Scratch& scratch) {
     if (parts_.layout.leaves_below(at.depth, at.slot).size() <= 1) return;
     split(at, scratch);
     split_down({at.depth + 1, 2 * at.slot}, scratch);
@@ -108,7 +109,7 @@ private:
   }
 
   /// Splits a slot down to its leaves and writes them.
-  void make_leaves(const Slot& at, typename Points::Scratch& scratch) {
+  [[gnu::noinline]] void make_leaves(const Slot& at, typename Points::Scratch& scratch) {
     split_down(at, scratch);
     parts_.blocks.fill(points_, parts_.layout, parts_.layout.leaves_below(at.depth, at.slot));
   }
