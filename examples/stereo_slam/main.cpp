@@ -8,6 +8,7 @@
 /// interrupted: the results are of the frames before.
 #include <algorithm>
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
 #include <future>
@@ -25,9 +26,11 @@
 #include "dataset.hpp"
 #include "outputs.hpp"
 #include "pipeline.hpp"
+#include "run_report.hpp"
 #include "summary.hpp"
 #include "support/command_line.hpp"
 #include "support/interruption.hpp"
+#include "support/live_page.hpp"
 #include "support/progress.hpp"
 #include "support/rig_file.hpp"
 #include "support/standard_output.hpp"
@@ -41,6 +44,7 @@ struct Arguments {
   std::filesystem::path out = "stereo_slam_out";
   std::filesystem::path dump, map, save_map, save_rig;
   bool there_and_back = false;
+  std::optional<std::uint16_t> live;
   std::string store = "multi";
   std::string features = "surf";
   std::string calibrate = "auto";
@@ -115,6 +119,10 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
   app.add_flag("--there-and-back", arguments.there_and_back,
                "the frames forwards, then backwards: how far from its start does the drive end?");
   app.add_flag("!--no-cache", arguments.dataset.arena.cache, "arena: do not keep rendered images on disk");
+  app.add_option("--live", arguments.live,
+                 "serve the report while it grows at this port of 127.0.0.1, for a browser; 0 = any free one")
+      ->check(example::whole_number(0, 65535))
+      ->type_name("PORT");
   app.add_option("--save", arguments.save_map, "write the map for another run into FILE")->type_name("FILE");
   app.add_option("--save-rig", arguments.save_rig,
                  "write the rig as the run corrected it, with its standard deviations, for --camera")
@@ -133,10 +141,17 @@ struct Run {
   int code = example::exit_well;
 };
 
+/// The report of a run that is under way.
+example::Report growing_report(stereo_slam::RunRecord record, std::size_t frames) {
+  record.notes.insert(record.notes.begin(), "frame " + std::to_string(record.frames.size()) + " of " +
+                                                std::to_string(frames) + ": the run goes on");
+  return run_report(record, summarise(record));
+}
+
 /// Runs the system over the data set; the next frame is loaded while this one is worked on. A frame that
 /// cannot be read and an interruption end the run early, with what there is until then; throws where that is
 /// nothing.
-Run run(const stereo_slam::Dataset& dataset, const Arguments& arguments) {
+Run run(const stereo_slam::Dataset& dataset, const Arguments& arguments, example::LivePage* live) {
   using Clock = std::chrono::steady_clock;
   Run result;
   stereo_slam::Pipeline pipeline =
@@ -144,6 +159,13 @@ Run run(const stereo_slam::Dataset& dataset, const Arguments& arguments) {
           ? stereo_slam::Pipeline(dataset.rig(), arguments.pipeline)
           : stereo_slam::Pipeline(dataset.rig(), arguments.pipeline, stereo_slam::load_map(arguments.map),
                                   arguments.map.string());
+  const auto record_so_far = [&] {
+    stereo_slam::RunRecord record = pipeline.record();
+    record.dataset = dataset.name();
+    const std::vector<std::string> notes = dataset.notes();
+    record.notes.insert(record.notes.begin(), notes.begin(), notes.end());
+    return record;
+  };
   example::Progress progress(std::cerr, "frames", dataset.size());
   const Clock::time_point start = Clock::now();
   const auto load = [&](std::size_t i) {
@@ -170,6 +192,7 @@ Run run(const stereo_slam::Dataset& dataset, const Arguments& arguments) {
                         ? std::to_string(done.inliers) + " of " + std::to_string(done.stereo_matches) +
                               " points agree, " + std::to_string(done.landmarks) + " landmarks"
                         : "lost");
+      if (live && live->wanted()) live->show(growing_report(record_so_far(), dataset.size()));
     }
   } catch (const std::exception& error) {
     if (progress.done() == 0) throw;
@@ -178,14 +201,12 @@ Run run(const stereo_slam::Dataset& dataset, const Arguments& arguments) {
   }
   if (!arguments.save_map.empty() && progress.done() > 0)
     stereo_slam::save_map(arguments.save_map, pipeline.map());
-  stereo_slam::RunRecord& record = result.record = pipeline.record();
+  stereo_slam::RunRecord& record = result.record = record_so_far();
+  record.newest.reset();
   if (!why.empty())
     record.ended_early = "ended after " + std::to_string(record.frames.size()) + " of " +
                          std::to_string(dataset.size()) + " frames: " + why;
   record.seconds = std::chrono::duration<double>(Clock::now() - start).count();
-  record.dataset = dataset.name();
-  const std::vector<std::string> notes = dataset.notes();
-  record.notes.insert(record.notes.begin(), notes.begin(), notes.end());
   return result;
 }
 
@@ -252,12 +273,19 @@ int main(int argc, char** argv) {
     }
     stereo_slam::prepare_output_folder(arguments.out);
     arguments.pipeline.sample_frame = frames->size() / 2;
-    const Run done = run(*frames, arguments);
+    std::optional<example::LivePage> live;
+    if (arguments.live) {
+      live.emplace(*arguments.live);
+      arguments.pipeline.keep_newest = true;
+      std::cerr << "live report: " << live->address() << '\n';
+    }
+    const Run done = run(*frames, arguments, live ? &*live : nullptr);
     if (done.record.ended_early) std::cerr << "stereo_slam: " << *done.record.ended_early << '\n';
     if (done.record.frames.empty()) return done.code;  // the results of an earlier run stay
     if (!arguments.save_rig.empty())
       example::write_rig(arguments.save_rig, stereo_slam::learned_rig(given, done.record));
     const std::optional<std::string> no_report = stereo_slam::write_outputs(done.record, arguments.out);
+    if (live) live->finish(run_report(done.record, summarise(done.record)));
     print_summary(done.record);
     if (arguments.there_and_back && !done.record.ended_early) print_return(done.record);
     if (no_report) std::cout << "no report.html: " << *no_report << '\n';

@@ -192,8 +192,12 @@ void Pipeline::follow(const StereoFrame& frame, FrameRecord& result) {
   result.tracked = located.has_value();
   result.relocalised = located && lost_;
   result.map_matches = static_cast<int>(matches.size());
-  if (record_.frames.size() == options_.sample_frame + 1)
-    keep_sample(frame, matches, located ? located->agreed : std::vector<Match>());
+  const bool is_sample = record_.frames.size() == options_.sample_frame + 1;
+  if (is_sample || options_.keep_newest) {
+    const SampleFrame shown = sample_of(frame, matches, located ? located->agreed : std::vector<Match>());
+    if (options_.keep_newest) record_.newest = shown;
+    if (is_sample) record_.sample = shown;
+  }
   if (!located) return lose(frame, matches.size());
   result.inliers = static_cast<int>(located->agreed.size());
   note_loop(*located);
@@ -543,8 +547,8 @@ cairn::StereoPoseOptions Pipeline::pose_options() const {
   return pose;
 }
 
-void Pipeline::keep_sample(const StereoFrame& frame, const std::vector<Match>& matches,
-                           const std::vector<Match>& agreed) {
+SampleFrame Pipeline::sample_of(const StereoFrame& frame, const std::vector<Match>& matches,
+                                const std::vector<Match>& agreed) const {
   SampleFrame sample{frame.index, frame.left, frame.right, {}};
   for (const LocalLandmark& local : locals_) {
     const cairn::Vector<4, float> p =
@@ -553,7 +557,7 @@ void Pipeline::keep_sample(const StereoFrame& frame, const std::vector<Match>& m
   }
   for (const Match& match : matches) sample.points[match.local].kind = SamplePoint::Kind::matched;
   for (const Match& match : agreed) sample.points[match.local].kind = SamplePoint::Kind::inlier;
-  record_.sample = std::move(sample);
+  return sample;
 }
 
 SavedMap Pipeline::map() const {

@@ -88,6 +88,7 @@ struct PipelineOptions {
   cairn::KeyframeMapOptions map;
   LoopWatchOptions loops;
   std::size_t sample_frame = 0;  ///< the frame shown with its matches in the report
+  bool keep_newest = false;      ///< record() has the last frame with its matches as well
   bool localise = false;         ///< a loaded map stays as it is: no keyframe, no landmark more
 };
 
@@ -163,8 +164,8 @@ private:
   [[nodiscard]] cairn::StereoSighting sighting(std::uint32_t local, LandmarkId landmark) const;
   [[nodiscard]] std::optional<cairn::PosePrior> prediction() const;
   [[nodiscard]] cairn::StereoPoseOptions pose_options() const;
-  void keep_sample(const StereoFrame& frame, const std::vector<Match>& matches,
-                   const std::vector<Match>& agreed);
+  [[nodiscard]] SampleFrame sample_of(const StereoFrame& frame, const std::vector<Match>& matches,
+                                      const std::vector<Match>& agreed) const;
 
   PipelineOptions options_;
   cairn::StereoRig rig_;

@@ -108,6 +108,7 @@ struct RunRecord {
   std::size_t aged = 0;               ///< landmarks that were not found where they should be
   double variance_factor = 1;         ///< by which variances are larger than the pixel sigma says, at the end
   std::optional<SampleFrame> sample;
+  std::optional<SampleFrame> newest;       ///< the last frame, where it was asked for
   std::vector<std::string> notes;          ///< what the reader should know: skipped frames, lost frames
   std::optional<std::string> ended_early;  ///< after which frame the run ended and why, where it did
 };

@@ -130,7 +130,7 @@ std::optional<example::PlaneFilm> correction_film(const RunRecord& run, const Su
                           .caption = "",
                           .x = {"right", "m"},
                           .y = {"ahead", "m"},
-                          .slider = {"from while driving (0) to the map at the end (1)", ""},
+                          .slider = {"share of the correction", ""},
                           .still = {},
                           .frames = {}};
   film.caption =
@@ -327,8 +327,9 @@ example::Cloud map_cloud(const RunRecord& run) {
 example::Picture sample_picture(const RunRecord& run) {
   example::Picture picture{
       .title = "One frame with its matches", .caption = "No frame was kept.", .png = {}, .marks = {}};
-  if (!run.sample || run.sample->left.empty()) return picture;
-  const SampleFrame& sample = *run.sample;
+  const std::optional<SampleFrame>& kept = run.newest ? run.newest : run.sample;
+  if (!kept || kept->left.empty()) return picture;
+  const SampleFrame& sample = *kept;
   picture.caption = "Left image of frame " + std::to_string(sample.index) +
                     ". A line leads from each point to where the right image shows it.";
   picture.png = example::png_bytes(sample.left);

@@ -318,6 +318,7 @@ std::string Report::data() const {
                                {"unit", figure.unit},
                                {"hint", figure.hint},
                                {"verdict", verdicts[static_cast<std::size_t>(figure.verdict)]}});
+  if (live_ > 0) json["live"] = live_;
   std::string text = dumped(json);
   text.back() = ',';  // the closing brace: the panels are JSON already
   text += "\"panels\":[";

@@ -17,6 +17,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -226,6 +227,9 @@ public:
   void figure(KeyFigure figure);
   /// A sentence that the reader should not miss.
   void note(std::string sentence);
+  /// The page is one of a growing row and asks its server for the next (live_page.hpp); `version` is at
+  /// least 1.
+  void live(std::uint64_t version) { live_ = version; }
 
   void add(const LinePlot& panel);
   void add(const PlanePlot& panel);
@@ -248,6 +252,7 @@ private:
   std::vector<KeyFigure> figures_;
   std::vector<std::string> notes_;
   std::vector<std::string> panels_;  // each the text of a JSON object
+  std::uint64_t live_ = 0;           // 0: finished
 };
 
 /// True where html() gives a page.

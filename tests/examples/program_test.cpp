@@ -4,6 +4,7 @@
 // The program as a user meets it: its exit code, its words and what it leaves behind.
 #include <chrono>
 #include <csignal>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <initializer_list>
@@ -22,6 +23,8 @@
 #include <cairn/version.hpp>
 
 #include "support/folder.hpp"
+#include "support/http.hpp"
+#include "support/live_page.hpp"
 #include "support/program_checks.hpp"
 #include "support/random.hpp"
 #include "support/report.hpp"
@@ -331,6 +334,37 @@ TEST_SUITE("program") {
       for (const char* out : {"out 2", "out 3", "out 2 again"})
         CHECK((cairn::read_file(folder / out / name) == bytes) == (name != "timing.json"));
     }
+  }
+
+  TEST_CASE("stereo_slam: --live shows the run while it goes on, and changes nothing of its results") {
+    if (const auto why = example::why_no_live_page()) {
+      MESSAGE("skipped: " << *why);
+      return;
+    }
+    const cairn_test::Folder folder;
+    const std::string frames = "--frames 6 --out \"" + (folder / "out").string();
+    REQUIRE(run(frames + " alone\"").code == 0);
+    const std::string address = example::LivePage(0).address();  // a port that was free a moment ago
+    const std::string port = address.substr(address.rfind(':') + 1, address.size() - address.rfind(':') - 2);
+    std::string growing, finished;
+    std::jthread reader([&](const std::stop_token& stop) {
+      while (!stop.stop_requested()) {
+        const auto page = cairn_test::http_get(static_cast<std::uint16_t>(std::stoi(port)), "/").body;
+        if (page.find("the run goes on") != std::string::npos) growing = page;
+        if (page.find("Stereo SLAM") != std::string::npos && page.find("\"live\"") == std::string::npos)
+          finished = page;
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      }
+    });
+    const Outcome watched = run(frames + " watched\" --live " + port);
+    reader.request_stop();
+    reader.join();
+    CAPTURE(watched.words);
+    REQUIRE(watched.code == 0);
+    CHECK(watched.says(address));
+    CHECK(growing.find("of 6: the run goes on") != std::string::npos);
+    CHECK(finished == cairn::read_file(folder / "out watched" / "report.html"));
+    cairn_test::check_same_bytes(folder / "out alone", folder / "out watched", results());
   }
 }
 

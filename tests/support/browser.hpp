@@ -45,17 +45,21 @@ struct OpenedPage {
   }
 };
 
-/// The document that Chromium makes of the file, and what it said meanwhile.
-inline OpenedPage open_page(const Folder& folder, const std::filesystem::path& page) {
-  const int status =
-      chromium(folder, "--dump-dom 'file://" + page.string() + "' >'" + (folder / "dom").string() + "' 2>'" +
-                           (folder / "log").string() + "'");
-  if (status != 0) throw std::runtime_error("chromium did not open " + page.string());
+/// The document that Chromium makes of what is at the address, and what it said meanwhile.
+inline OpenedPage open_address(const Folder& folder, const std::string& address) {
+  const int status = chromium(folder, "--dump-dom '" + address + "' >'" + (folder / "dom").string() +
+                                          "' 2>'" + (folder / "log").string() + "'");
+  if (status != 0) throw std::runtime_error("chromium did not open " + address);
   OpenedPage opened{cairn::read_file(folder / "dom"), {}};
   std::istringstream log(cairn::read_file(folder / "log"));
   for (std::string line; std::getline(log, line);)
     if (line.find("CONSOLE") != std::string::npos) opened.console += line + "\n";
   return opened;
+}
+
+/// The same of a file.
+inline OpenedPage open_page(const Folder& folder, const std::filesystem::path& page) {
+  return open_address(folder, "file://" + page.string());
 }
 
 /// NAME-light.png and NAME-dark.png where CAIRN_SCREENSHOTS says; false where Chromium fails.

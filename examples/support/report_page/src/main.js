@@ -2,6 +2,7 @@
 import { cloud } from './cloud.js';
 import { element } from './dom.js';
 import { heat } from './heat.js';
+import { follow } from './live.js';
 import { pictureFilm } from './picture_film.js';
 import { film, plane } from './plane.js';
 import { picture, table } from './plain.js';
@@ -23,7 +24,8 @@ const kinds = {
 function head(data) {
   const button = element('button', { type: 'button', title: 'Switch between light and dark' }, 'light / dark');
   button.addEventListener('click', toggleTheme);
-  return element('header', {}, element('div', {}, element('h1', {}, data.title), element('p', {}, data.subtitle)), button);
+  return element('header', {}, element('div', {}, element('h1', {}, data.title), element('p', {}, data.subtitle)),
+    data.live ? follow(data.live) : null, button);
 }
 
 /** Verdicts are said in words as well: colours are not for everybody. */
