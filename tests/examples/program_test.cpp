@@ -350,8 +350,8 @@ TEST_SUITE("program") {
     std::jthread reader([&](const std::stop_token& stop) {
       while (!stop.stop_requested()) {
         const auto page = cairn_test::http_get(static_cast<std::uint16_t>(std::stoi(port)), "/").body;
-        if (page.find("the run goes on") != std::string::npos) growing = page;
-        if (page.find("Stereo SLAM") != std::string::npos && page.find("\"live\"") == std::string::npos)
+        if (page.find("of 6: the run goes on") != std::string::npos) growing = page;
+        if (page.find("Stereo SLAM") != std::string::npos && page.find("\"live\":") == std::string::npos)
           finished = page;
         std::this_thread::sleep_for(std::chrono::milliseconds(5));
       }
@@ -362,7 +362,7 @@ TEST_SUITE("program") {
     CAPTURE(watched.words);
     REQUIRE(watched.code == 0);
     CHECK(watched.says(address));
-    CHECK(growing.find("of 6: the run goes on") != std::string::npos);
+    CHECK_FALSE(growing.empty());
     CHECK(finished == cairn::read_file(folder / "out watched" / "report.html"));
     cairn_test::check_same_bytes(folder / "out alone", folder / "out watched", results());
   }
