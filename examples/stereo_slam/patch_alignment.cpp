@@ -102,12 +102,28 @@ bool residual(const Template& reference, cairn::ImageView right, float x, float 
   if (!inside(right, x + warp(0), y + warp(1), margin) || std::abs(warp(2)) > farthest ||
       std::abs(warp(3)) > farthest)
     return false;
+  // A row of the patch lies between two rows of the image: blended once, which leaves two of four products.
+  constexpr int most_columns = 20;  // 10 steps of at most 1.4 pixels, and the neighbour
+  static_assert(most_columns >= 2 * patch_half * (1 + farthest / patch_half) + 2);
+  const float step = 1 + warp(2) / patch_half, reach = std::abs(step) * patch_half;
   for (int v = -patch_half, i = 0; v <= patch_half; ++v) {
     const auto fv = static_cast<float>(v);
-    const float row_x = x + warp(0) + warp(3) * fv / patch_half;
-    const float step = 1 + warp(2) / patch_half;
-    for (int u = -patch_half; u <= patch_half; ++u, ++i)
-      difference(i) = sample(right, row_x + step * static_cast<float>(u), y + fv + warp(1));
+    const float row_x = x + warp(0) + warp(3) * fv / patch_half, row_y = y + fv + warp(1);
+    const int first = static_cast<int>(row_x - reach), line = static_cast<int>(row_y);
+    const int columns = static_cast<int>(row_x + reach) + 2 - first;
+    const float fy = row_y - static_cast<float>(line);
+    const std::uint8_t* top = right.row(line) + first;
+    const std::uint8_t* bottom = top + right.stride();
+    std::array<float, most_columns> blended{};
+    for (int c = 0; c < columns; ++c)
+      blended[static_cast<std::size_t>(c)] =
+          static_cast<float>(top[c]) + fy * static_cast<float>(bottom[c] - top[c]);
+    const float start = row_x - static_cast<float>(first);
+    for (int u = -patch_half; u <= patch_half; ++u, ++i) {
+      const float at = start + step * static_cast<float>(u);
+      const auto c = static_cast<std::size_t>(static_cast<int>(at));
+      difference(i) = blended[c] + (at - static_cast<float>(c)) * (blended[c + 1] - blended[c]);
+    }
   }
   const float norm = centre(difference);
   if (!(norm > 0)) return false;
