@@ -11,10 +11,12 @@
 #include <ctime>
 #include <filesystem>
 #include <fstream>
+#include <iomanip>
 #include <iostream>
 #include <memory>
 #include <numeric>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -71,8 +73,12 @@ double mean_of(const std::vector<double>& values, std::size_t from, std::size_t 
          static_cast<double>(to - from);
 }
 
+/// To a power of ten; multiples of 0.01 that are no numbers of a computer would show as 56.550000000000004.
 std::string rounded(double value, double unit) {
-  return cairn::shortest(std::round(value / unit) * unit);
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(std::max(0, static_cast<int>(std::lround(-std::log10(unit)))))
+       << value;
+  return text.str();
 }
 
 // ---------------------------------------------------------------- two stores

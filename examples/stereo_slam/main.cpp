@@ -48,6 +48,7 @@ struct Arguments {
   std::string store = "multi";
   std::string features = "surf";
   std::string calibrate = "auto";
+  std::string motion = "off";
 };
 
 /// Everything the command line can say; CLI11 ends the program by an exception on --help and on mistakes.
@@ -102,6 +103,13 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
                  "off, or drifting (for rigs that come loose)")
       ->check(CLI::IsMember(std::vector<std::string>(stereo_slam::calibration_names.begin(),
                                                      stereo_slam::calibration_names.end())))
+      ->capture_default_str();
+  app.add_option("--motion", arguments.motion,
+                 "a filter follows the camera's motion: off, ekf, iterated or ukf. It narrows the search, "
+                 "carries the "
+                 "camera\nover frames that show nothing and refuses poses that it cannot have come to")
+      ->check(CLI::IsMember(
+          std::vector<std::string>(stereo_slam::motion_names.begin(), stereo_slam::motion_names.end())))
       ->capture_default_str();
   app.add_option("--features", arguments.features,
                  "interest points: surf, or OpenCV's sift or orb where it was there when building")
@@ -256,6 +264,9 @@ int main(int argc, char** argv) {
     const auto calibrate = std::ranges::find(stereo_slam::calibration_names, arguments.calibrate);
     arguments.pipeline.calibrate =
         static_cast<stereo_slam::Calibration>(calibrate - stereo_slam::calibration_names.begin());
+    const auto motion = std::ranges::find(stereo_slam::motion_names, arguments.motion);
+    arguments.pipeline.motion.filter =
+        static_cast<stereo_slam::Motion>(motion - stereo_slam::motion_names.begin());
     auto frames = stereo_slam::open_dataset(arguments.dataset);
     if (arguments.there_and_back) frames = stereo_slam::there_and_back(std::move(frames));
     if (!arguments.dump.empty()) {

@@ -102,12 +102,44 @@ bool residual(const Template& reference, cairn::ImageView right, float x, float 
   if (!inside(right, x + warp(0), y + warp(1), margin) || std::abs(warp(2)) > farthest ||
       std::abs(warp(3)) > farthest)
     return false;
+  // A row of the patch lies between two rows of the image: blended once, which leaves two of four products.
+  constexpr int most_columns = 20;  // 10 steps of at most 1.4 pixels, and the neighbour
+  static_assert(most_columns >= 2 * patch_half * (1 + farthest / patch_half) + 2);
+  const float step = 1 + warp(2) / patch_half, reach = step * patch_half;  // the step is 0.6 at least
   for (int v = -patch_half, i = 0; v <= patch_half; ++v) {
     const auto fv = static_cast<float>(v);
-    const float row_x = x + warp(0) + warp(3) * fv / patch_half;
-    const float step = 1 + warp(2) / patch_half;
-    for (int u = -patch_half; u <= patch_half; ++u, ++i)
-      difference(i) = sample(right, row_x + step * static_cast<float>(u), y + fv + warp(1));
+    const float row_x = x + warp(0) + warp(3) * fv / patch_half, row_y = y + fv + warp(1);
+    const int first = static_cast<int>(row_x - reach), line = static_cast<int>(row_y);
+    const int columns = static_cast<int>(row_x + reach) + 2 - first;
+    const float fy = row_y - static_cast<float>(line);
+    const std::uint8_t* top = right.row(line) + first;
+    const std::uint8_t* bottom = top + right.stride();
+    std::array<float, most_columns> blended{};
+    const auto blend = [&](int count) {
+      for (int c = 0; c < count; ++c)
+        blended[static_cast<std::size_t>(c)] =
+            static_cast<float>(top[c]) + fy * static_cast<float>(bottom[c] - top[c]);
+    };
+    constexpr int usual = 16;  // known beforehand: whole registers
+    if (columns <= usual && first + usual <= right.width())
+      blend(usual);
+    else
+      blend(columns);
+    // Each by itself, so that all but the reading is done in registers; the twelfth place fills the last one.
+    std::array<float, patch_side + 1> part{}, here{}, next{};
+    std::array<int, patch_side + 1> column{};
+    const float start = row_x - static_cast<float>(first) - reach;
+    for (std::size_t k = 0; k < part.size(); ++k) {
+      const float at = start + step * static_cast<float>(static_cast<int>(k));
+      column[k] = static_cast<int>(at);
+      part[k] = at - static_cast<float>(column[k]);
+    }
+    for (std::size_t k = 0; k < patch_side; ++k) {
+      here[k] = blended[static_cast<std::size_t>(column[k])];
+      next[k] = blended[static_cast<std::size_t>(column[k]) + 1];
+    }
+    for (std::size_t k = 0; k < part.size(); ++k) here[k] += part[k] * (next[k] - here[k]);
+    for (std::size_t k = 0; k < patch_side; ++k, ++i) difference(i) = here[k];
   }
   const float norm = centre(difference);
   if (!(norm > 0)) return false;

@@ -9,6 +9,7 @@
 #include <tuple>
 #include <utility>
 
+#include <cairn/core/cholesky.hpp>
 #include <cairn/core/parallel.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/io/text.hpp>
@@ -68,6 +69,7 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options)
       calibration_(rig, options.calibration),
       store_(make_landmark_store(store_options(options))),
       map_(rig, map_options(options)),
+      motion_(options.motion),
       loop_watch_(options.loops),
       pose_covariance_(cairn::Matrix<6>::Zero()) {
   record_.seed = options.seed;
@@ -75,6 +77,7 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options)
   record_.target_points = options.points;
   record_.features = feature_names[static_cast<std::size_t>(options.features)];
   record_.store = options.store.kind == StoreKind::multi ? "multi" : "single";
+  record_.motion = motion_names[static_cast<std::size_t>(options.motion.filter)];
 }
 
 Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options, SavedMap known,
@@ -121,6 +124,10 @@ const FrameRecord& Pipeline::work_on(const StereoFrame& frame, double load_milli
   timed(result, Stage::total, [&] {
     timed(result, Stage::detect, [&] { detect(frame); });
     timed(result, Stage::stereo, [&] { find_local_landmarks(frame); });
+    constexpr double usual = 0.1;  // [s], where the clock of a recording stands still
+    const double dt = time_ ? frame.time - *time_ : usual;
+    motion_.predict(dt > 0 && std::isfinite(dt) ? dt : usual);
+    time_ = frame.time;
     if (map_.empty())
       begin(frame, result);
     else
@@ -148,7 +155,7 @@ const FrameRecord& Pipeline::work_on(const StereoFrame& frame, double load_milli
 /// The first frame that shows enough is where the world begins.
 void Pipeline::begin(const StereoFrame& frame, FrameRecord& result) {
   result.tracked = locals_.size() >= options_.min_inliers;
-  if (!result.tracked) return lose(frame, 0);
+  if (!result.tracked) return lose(frame, "too few points with a place make no beginning", result);
   timed(result, Stage::store, [&] {
     choose_calibration();
     map_.begin(T_world_camera_);
@@ -156,6 +163,7 @@ void Pipeline::begin(const StereoFrame& frame, FrameRecord& result) {
     close_step();
   });
   pose_covariance_ = cairn::Matrix<6>::Identity() * (options_.map.first_sigma * options_.map.first_sigma);
+  motion_.begin(T_world_camera_, pose_covariance_);
   result.keyframe = true;
 }
 
@@ -188,7 +196,12 @@ void Pipeline::choose_calibration() {
 /// Every other frame: where it is, and what the map learns by it.
 void Pipeline::follow(const StereoFrame& frame, FrameRecord& result) {
   std::vector<Match> matches = timed(result, Stage::match, [&] { return match_with_map(); });
-  const std::optional<Located> located = timed(result, Stage::pose, [&] { return locate(matches); });
+  std::optional<Located> located = timed(result, Stage::pose, [&] { return locate(matches); });
+  const bool refused = located && !believes(located->location);
+  if (refused) {
+    ++record_.refused;
+    located.reset();
+  }
   result.tracked = located.has_value();
   result.relocalised = located && lost_;
   result.map_matches = static_cast<int>(matches.size());
@@ -198,7 +211,11 @@ void Pipeline::follow(const StereoFrame& frame, FrameRecord& result) {
     if (options_.keep_newest) record_.newest = shown;
     if (is_sample) record_.sample = shown;
   }
-  if (!located) return lose(frame, matches.size());
+  if (!located)
+    return lose(frame,
+                refused ? "the pose that the map gives is not one that the motion can lead to"
+                        : std::to_string(matches.size()) + " matches with the map do not agree on a pose",
+                result);
   result.inliers = static_cast<int>(located->agreed.size());
   note_loop(*located);
   move_to(*located, result);
@@ -212,11 +229,27 @@ void Pipeline::follow(const StereoFrame& frame, FrameRecord& result) {
     timed(result, Stage::update, [&] { calibrate(located->agreed); });
 }
 
-void Pipeline::lose(const StereoFrame& frame, std::size_t matches) {
+/// A frame that is nowhere: the camera is where its motion leads, as long as that is known.
+void Pipeline::lose(const StereoFrame& frame, const std::string& why, FrameRecord& result) {
   T_last_camera_ = cairn::SE3();
-  lost_ = !map_.empty();
-  record_.notes.push_back(frame.name + ": lost, " + std::to_string(matches) +
-                          " matches with the map do not agree on a pose; the last pose is kept");
+  result.carried = !map_.empty() && !lost_ && motion_.knows();
+  if (result.carried) {
+    const cairn::Gaussian<cairn::SE3> pose = *motion_.pose();
+    T_world_camera_ = pose.mean;
+    pose_covariance_ = pose.covariance;
+  } else {
+    lost_ = !map_.empty();
+  }
+  record_.notes.push_back(frame.name + ": lost, " + why + "; the " +
+                          (result.carried ? "motion goes on" : "last pose is kept"));
+}
+
+/// Whether the camera can be there. One that is lost can be anywhere.
+bool Pipeline::believes(const cairn::MapLocation& here) {
+  if (!motion_.on()) return true;
+  if (!lost_) return motion_.update(here.T_world_camera, here.covariance);
+  motion_.begin(here.T_world_camera, here.covariance);
+  return true;
 }
 
 /// Interest points of both images, one thread each.
@@ -265,8 +298,16 @@ std::vector<Pipeline::Match> Pipeline::match_with_map() const {
 /// RANSAC over the matches, a second look for landmarks that the pose says must be in view, and the last word
 /// to the joint covariance of the keyframes that all of them rest on.
 std::optional<Pipeline::Located> Pipeline::locate(std::vector<Match>& matches) {
-  const cairn::StereoPose pose =
-      cairn::estimate_stereo_pose(rig_, observations(matches), pose_options(), prediction());
+  const auto estimate = [&](std::vector<Match>& from) {
+    return cairn::estimate_stereo_pose(rig_, observations(from), pose_options(), prediction());
+  };
+  std::vector<Match> near = within_reach(matches);
+  cairn::StereoPose pose = estimate(near);
+  if (!pose.good() && near.size() < matches.size()) {
+    near = matches;
+    pose = estimate(near);
+  }
+  matches = std::move(near);
   if (!pose.good()) return std::nullopt;
   look_again(pose, matches);
   Located located;
@@ -277,6 +318,36 @@ std::optional<Pipeline::Located> Pipeline::locate(std::vector<Match>& matches) {
     if (located.location.inliers[i] != 0) located.agreed.push_back(matches[i]);
   if (lost_ && located.agreed.size() < options_.relocating_inliers) return std::nullopt;
   return located;
+}
+
+/// The matches whose landmark may be seen there from where the motion leads: all of them where that is not
+/// known.
+std::vector<Pipeline::Match> Pipeline::within_reach(const std::vector<Match>& matches) {
+  if (lost_ || !motion_.on() || !motion_.knows()) return matches;
+  const cairn::Gaussian<cairn::SE3> camera = *motion_.pose();
+  const cairn::SE3 T_camera_world = camera.mean.inverse();
+  const double gate = options_.motion_gate * options_.motion_gate;
+  std::vector<Match> near;
+  for (const Match& match : matches) {
+    const LocalLandmark& local = locals_[match.local];
+    const auto landmark = map_.landmark(match.landmark);
+    if (!landmark) continue;
+    const cairn::Vector<3> p = T_camera_world * landmark->mean;
+    const auto seen = rig_.project_with_jacobian(p);
+    if (!seen) continue;
+    cairn::Matrix<3, 6> J;  // of p by a right step of the camera
+    J << -cairn::Matrix<3>::Identity(), cairn::skew(p);
+    const cairn::Matrix<3> R = T_camera_world.rotation().matrix();
+    const cairn::Matrix<3> place =
+        J * camera.covariance * J.transpose() + R * landmark->covariance * R.transpose();
+    cairn::Matrix<4> P = seen->J_point * place * seen->J_point.transpose();
+    P.diagonal().array() += local.sigma * local.sigma;
+    const cairn::Vector<4> off =
+        (cairn::Vector<4>() << local.left_pixel, local.right_pixel).finished() - seen->pixels;
+    const cairn::Cholesky<4> root(P);
+    if (root.good() && root.whiten(off).squaredNorm() < gate) near.push_back(match);
+  }
+  return near;
 }
 
 /// Landmarks that the keyframes in play saw, and no local one is taken for yet, are searched for where the
@@ -536,6 +607,7 @@ std::vector<cairn::StereoSighting> Pipeline::sightings(std::span<const Match> ma
 /// Where the motion of the last step leads; of a camera that is lost nothing is known.
 std::optional<cairn::PosePrior> Pipeline::prediction() const {
   if (lost_) return std::nullopt;
+  if (const auto pose = motion_.pose(); motion_.on() && pose) return cairn::PosePrior{pose->mean};
   return cairn::PosePrior{T_world_camera_ * T_last_camera_};
 }
 

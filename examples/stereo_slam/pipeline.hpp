@@ -36,6 +36,7 @@
 #include "landmarks.hpp"
 #include "loop_watch.hpp"
 #include "noise_factors.hpp"
+#include "pose_filter.hpp"
 #include "run_record.hpp"
 #include "saved_map.hpp"
 #include "self_calibration.hpp"
@@ -86,6 +87,9 @@ struct PipelineOptions {
   double ageing_share = 0.1;  ///< when it was found in less than this share of them
   double twin_radius = 1.5;   ///< landmarks nearer than this in both images may be the same [pixels]
   cairn::KeyframeMapOptions map;
+  MotionOptions motion;
+  /// A match is searched among what lies within so many standard deviations of where the motion leads.
+  double motion_gate = 6;
   LoopWatchOptions loops;
   std::size_t sample_frame = 0;  ///< the frame shown with its matches in the report
   bool keep_newest = false;      ///< record() has the last frame with its matches as well
@@ -136,12 +140,14 @@ private:
   void detect(const StereoFrame& frame);
   void find_local_landmarks(const StereoFrame& frame);
   [[nodiscard]] std::vector<Match> match_with_map() const;
-  /// Adds to `matches` what the second look finds.
+  /// Leaves of `matches` what can be where the motion leads, and adds what the second look finds.
   [[nodiscard]] std::optional<Located> locate(std::vector<Match>& matches);
+  [[nodiscard]] std::vector<Match> within_reach(const std::vector<Match>& matches);
+  [[nodiscard]] bool believes(const cairn::MapLocation& here);
   void begin(const StereoFrame& frame, FrameRecord& result);
   void choose_calibration();
   void follow(const StereoFrame& frame, FrameRecord& result);
-  void lose(const StereoFrame& frame, std::size_t matches);
+  void lose(const StereoFrame& frame, const std::string& why, FrameRecord& result);
   void move_to(const Located& located, FrameRecord& result);
   [[nodiscard]] bool wants_keyframe(std::size_t agreed);
   void make_keyframe(const Located& located, const StereoFrame& frame, FrameRecord& result);
@@ -179,6 +185,8 @@ private:
   Landmarks landmarks_;
   cairn::KeyframeMap map_;
   NoiseFactors noise_factors_;
+  PoseFilter motion_;
+  std::optional<double> time_;  // of the frame before [s]
   LoopWatch loop_watch_;
   std::vector<ExpectedLandmark> expected_;  // of the second look
   bool lost_ = false;                       // where the camera is is not known from the frame before

@@ -33,6 +33,7 @@ struct FrameRecord {
   cairn::Matrix<6, 6> covariance;   ///< of the pose, tangent at the pose: translation, then rotation
   std::optional<cairn::SE3> truth;  ///< true T_world_camera in the same world, where the data has it
   bool tracked = false;
+  bool carried = false;      ///< not tracked, but its motion says where it is
   bool relocalised = false;  ///< tracked, though nothing was known of where the camera is
   int points_left = 0;
   int points_right = 0;
@@ -93,7 +94,7 @@ struct LoopClosure {
 
 struct RunRecord {
   std::string dataset;
-  std::string features, store;
+  std::string features, store, motion = "off";
   std::uint64_t seed = 0;
   unsigned threads = 1;
   int target_points = 0;
@@ -104,6 +105,7 @@ struct RunRecord {
   cairn::StereoRig rig;  ///< as it is believed to be at the end
   std::vector<LoopClosure> loops;
   std::vector<cairn::SE3> corrected;  ///< T_world_camera of every frame as the map has it at the end
+  std::size_t refused = 0;            ///< poses that the motion could not lead to
   std::size_t merged = 0;             ///< landmarks that were another's twin
   std::size_t aged = 0;               ///< landmarks that were not found where they should be
   double variance_factor = 1;         ///< by which variances are larger than the pixel sigma says, at the end

@@ -63,6 +63,9 @@ void add_figures(example::Report& report, const Summary& summary) {
                  "of " + std::to_string(summary.frames),
                  summary.frames_lost == 0 ? "none lost" : std::to_string(summary.frames_lost) + " lost",
                  summary.frames_lost == 0 ? Verdict::good : Verdict::bad});
+  if (summary.frames_carried > 0)
+    report.figure({"frames carried", std::to_string(summary.frames_carried), "of the lost",
+                   "their pose is where the motion leads"});
   report.figure({"path", readable(summary.path), "m", ""});
   report.figure({"landmarks", std::to_string(summary.landmarks), "", "in the map at the end"});
   report.figure({"keyframes", std::to_string(summary.keyframes), "", "in the map at the end"});

@@ -240,6 +240,7 @@ Summary summarise(const RunRecord& run) {
   summary.frames = run.frames.size();
   for (const FrameRecord& frame : run.frames) {
     summary.frames_tracked += frame.tracked ? 1 : 0;
+    summary.frames_carried += frame.carried ? 1 : 0;
     summary.relocalisations += frame.relocalised ? 1 : 0;
   }
   summary.frames_lost = summary.frames - summary.frames_tracked;
@@ -266,6 +267,8 @@ std::string summary_json(const RunRecord& run, const Summary& summary) {
   json["frames"] = summary.frames;
   json["frames_tracked"] = summary.frames_tracked;
   json["frames_lost"] = summary.frames_lost;
+  json["frames_carried"] = summary.frames_carried;
+  json["poses_refused"] = run.refused;
   json["relocalisations"] = summary.relocalisations;
   json["ended_early"] = run.ended_early ? Json(*run.ended_early) : Json(nullptr);
   json["points_left"] = number(summary.points_left);
@@ -285,6 +288,7 @@ std::string summary_json(const RunRecord& run, const Summary& summary) {
   append_errors(json, summary);
   json["features"] = run.features;
   json["store"] = run.store;
+  json["motion"] = run.motion;
   json["seed"] = run.seed;
   json["variance_factor"] = number(run.variance_factor);
   Json& calibration = json["calibration"];

@@ -10,6 +10,8 @@
 
 #include <doctest/doctest.h>
 
+#include <cairn/core/cholesky.hpp>
+
 #include "arena_dataset.hpp"
 #include "saved_map.hpp"
 #include "support/data.hpp"
@@ -143,6 +145,59 @@ TEST_SUITE("pipeline") {
     CHECK(error.head<3>().norm() < 0.02);
     REQUIRE(record.notes.size() == 1);
     CHECK(record.notes[0].find("lost") != std::string::npos);
+  }
+
+  TEST_CASE("pipeline: the motion carries the camera over frames that show nothing, by each of the filters") {
+    std::vector<StereoFrame> frames = drive();
+    for (std::size_t i = 5; i < 10; ++i) frames[i] = black(frames[i]);
+    const auto error = [](const FrameRecord& frame) {
+      return cairn::local(*frame.truth, frame.T_world_camera).head<3>().norm();
+    };
+    const RunRecord without = run(frames, options());
+    for (const stereo_slam::Motion motion :
+         {stereo_slam::Motion::ekf, stereo_slam::Motion::iterated, stereo_slam::Motion::ukf}) {
+      PipelineOptions with = options();
+      with.motion.filter = motion;
+      const RunRecord record = run(frames, with);
+      CAPTURE(record.motion);
+      CHECK(record.refused == 0);
+      for (std::size_t i = 0; i < frames.size(); ++i) {
+        CAPTURE(i);
+        const FrameRecord& frame = record.frames[i];
+        const bool blank = i >= 5 && i < 10;
+        CHECK(frame.tracked == !blank);
+        CHECK(frame.carried == blank);
+        CHECK_FALSE(frame.relocalised);
+        CHECK(error(frame) < (blank ? 0.1 : 0.02));
+        if (!blank) continue;
+        CHECK_FALSE(without.frames[i].carried);
+        CHECK(error(frame) < 0.5 * error(without.frames[i]));
+        const double nees = cairn::Cholesky<6>(frame.covariance)
+                                .whiten(cairn::local(frame.T_world_camera, *frame.truth))
+                                .squaredNorm();
+        CHECK(nees < 22.5);  // 0.999 of six degrees of freedom
+      }
+    }
+  }
+
+  TEST_CASE("pipeline: a pose that the motion cannot lead to is refused and counted, and the drive goes on") {
+    std::vector<StereoFrame> frames = drive();
+    frames[9].left = frames[0].left;  // as if the camera were back at the start for a tenth of a second
+    frames[9].right = frames[0].right;
+    PipelineOptions with = options();
+    with.motion.filter = stereo_slam::Motion::ekf;
+    const RunRecord record = run(frames, with);
+    CHECK(record.refused == 1);
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      CAPTURE(i);
+      CHECK(record.frames[i].tracked == (i != 9));
+      CHECK((record.frames[i].T_world_camera.translation() - record.frames[i].truth->translation()).norm() <
+            0.03);
+    }
+    REQUIRE(record.notes.size() == 1);
+    CHECK(record.notes[0].find("not one that the motion can lead to; the motion goes on") !=
+          std::string::npos);
+    CHECK(run(frames, options()).frames[9].tracked);
   }
 
   TEST_CASE("pipeline: the world begins where something is seen first") {
