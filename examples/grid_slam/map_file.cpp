@@ -74,10 +74,6 @@ void parts(Archive& archive, StepRecord& s) {
   archive(s.scan, s.effective_size, s.resampled, s.moved, s.pose.mean, s.pose.covariance);
 }
 template <class Archive>
-void parts(Archive& archive, WayThere& w) {
-  archive(w.forwards, w.backwards, w.noise);
-}
-template <class Archive>
 void parts(Archive& archive, Loop& l) {
   archive(l.first, l.last, l.T_first_last, l.covariance);
 }
@@ -85,7 +81,7 @@ void parts(Archive& archive, Loop& l) {
 namespace {
 
 constexpr std::string_view kind = "cairngrd";
-constexpr std::uint64_t version = 3;
+constexpr std::uint64_t version = 2;
 
 /// Grids that share tiles: every tile once, and for each grid the numbers of its own.
 template <class Cell>
@@ -197,14 +193,13 @@ bool growing(const std::vector<double>& numbers) {
 /// What of a mapper is neither a map nor a path.
 template <class Archive>
 void Mapper::plain_parts(Archive& archive, Mapper& m) {
-  archive(m.steps_, m.points_, m.ways_, m.travelled_, m.scans_, m.loops_);
+  archive(m.steps_, m.points_, m.travelled_, m.scans_, m.loops_);
   archive(m.motion_.forwards, m.motion_.backwards, m.motion_.distance, m.motion_.angle, m.motion_.stood);
   archive(m.looked_, m.asked_, m.asked_at_);
 }
 
 void Mapper::expect_sound(const Reader& reader) const {
-  if (scans_.empty() || travelled_.size() != steps_.size() + 1 || points_.size() != steps_.size() ||
-      ways_.size() != steps_.size())
+  if (scans_.empty() || travelled_.size() != steps_.size() + 1 || points_.size() != steps_.size())
     reader.refuse("the map has not as many scans as steps");
   if (steps_.empty() || steps_.front().scan != 0 || steps_.back().scan >= scans_.size() ||
       std::ranges::adjacent_find(steps_, std::ranges::greater_equal{}, &StepRecord::scan) != steps_.end())
@@ -216,7 +211,6 @@ void Mapper::expect_sound(const Reader& reader) const {
       reader.refuse("a loop joins poses that there are not");
     expect_covariance(reader, loop.covariance);
   }
-  for (const WayThere& way : ways_) expect_covariance(reader, way.noise);
 }
 
 void Mapper::save(const std::filesystem::path& path) const {

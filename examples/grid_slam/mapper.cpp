@@ -35,6 +35,17 @@ std::vector<SE2> poses_on(const std::vector<cairn::PathPose<SE2>>& path) {
   return poses;
 }
 
+StepChain chain_of(const std::vector<cairn::PathPose<SE2>>& path) {
+  // A match that is surer than this is a match to what was seen a moment ago.
+  const Matrix<3> least = Vector<3>(9e-6, 9e-6, 1e-6).asDiagonal();
+  StepChain chain{path.front().pose, {}, {}};
+  for (std::size_t k = 1; k < path.size(); ++k) {
+    chain.steps.push_back(path[k].before.inverse() * path[k].drawn);
+    chain.covariances.push_back(path[k].drawn_from.covariance + least);
+  }
+  return chain;
+}
+
 /// Points of several scans, seen from the last pose.
 std::vector<ScanPoint> seen_together(const std::vector<SE2>& poses,
                                      const std::vector<std::vector<ScanPoint>>& points, std::size_t first,
@@ -217,58 +228,6 @@ Matrix<3> Mapper::motion_noise() const {
   return Vector<3>(along * along, along * along, turn * turn).asDiagonal();
 }
 
-/// The step that the robot took to a pose where the path has jumped: a step that neither direction's odometry
-/// takes, and that what was seen just before refutes. There the path met a part of the map that was made long
-/// ago. Nothing where the step may be one.
-std::optional<cairn::Gaussian<SE2>> Mapper::instead_of_jump(const std::vector<SE2>& poses, std::size_t pose,
-                                                            const SE2& step) const {
-  constexpr double gate = 25;      // of squared Mahalanobis distances, and of log likelihoods twice
-  constexpr std::size_t few = 10;  // scans before
-  const WayThere& way = ways_[pose - 1];
-  const cairn::Cholesky<3> root(way.noise);
-  if (pose < 3 || !root.good()) return std::nullopt;
-  for (const SE2& there : {way.forwards, way.backwards})
-    if (root.whiten(cairn::local(there, step)).squaredNorm() <= gate) return std::nullopt;
-  OccupancyMap before = empty_map();
-  for (std::size_t k = pose > few ? pose - few : 1; k < pose; ++k)
-    before.insert(poses[pose - 1].inverse() * poses[k], points_[k - 1]);
-  const auto& now = points_[pose - 1];
-  std::optional<cairn::Gaussian<SE2>> best;
-  double most = before.log_likelihood(step, now) + 0.5 * gate;
-  for (const SE2& there : {way.forwards, way.backwards})
-    if (const auto found = FromMatch{}.found(before, {there, way.noise}, now))
-      if (const double l = before.log_likelihood(found->mean, now); l > most) {
-        most = l;
-        best = found;
-      }
-  return best;
-}
-
-/// The steps of a path as they were drawn, but for those that jumped.
-StepChain Mapper::chain_of(const std::vector<cairn::PathPose<SE2>>& path) const {
-  // A match that is surer than this is a match to what was seen a moment ago.
-  const Matrix<3> least = Vector<3>(9e-6, 9e-6, 1e-6).asDiagonal();
-  const std::vector<SE2> poses = poses_on(path);
-  StepChain chain{path.front().pose, {}, {}};
-  for (std::size_t k = 1; k < path.size(); ++k) {
-    const SE2 drawn = path[k].before.inverse() * path[k].drawn;
-    const auto instead = instead_of_jump(poses, k, drawn);
-    chain.steps.push_back(instead ? instead->mean : drawn);
-    chain.covariances.push_back((instead ? instead->covariance : path[k].drawn_from.covariance) + least);
-  }
-  return chain;
-}
-
-std::vector<SE2> Mapper::without_jumps(const std::vector<SE2>& poses) const {
-  std::vector<SE2> all{poses.front()};
-  for (std::size_t k = 1; k < poses.size(); ++k) {
-    const SE2 step = poses[k - 1].inverse() * poses[k];
-    const auto instead = instead_of_jump(poses, k, step);
-    all.push_back(all.back() * (instead ? instead->mean : step));
-  }
-  return all;
-}
-
 void Mapper::process(const cairn::StampedScan& scan) {
   const std::size_t index = scans_.size() - 1;
   const Matrix<3> noise = motion_noise();
@@ -294,7 +253,6 @@ void Mapper::process(const cairn::StampedScan& scan) {
   points_.push_back(cairn::scan_points(scan.scan));
   FromMatch proposal;
   proposal.widened = options_.widened;
-  ways_.push_back({motion_.forwards, motion_.backwards, noise});
   const cairn::ConditionalFilter filter{.resample_below = options_.resample_below,
                                         .evidence_share = options_.evidence_share,
                                         .insert = !frozen_.has_value(),
@@ -318,12 +276,11 @@ void Mapper::look_for_loop() {
   const auto path = belief_->path(belief_->best());
   const std::vector<SE2> poses = poses_on(path);
   const StepChain chain = chain_of(path);
-  const std::vector<SE2> smooth = without_jumps(poses);
   for (const std::size_t first : old_places(poses, chain)) {
     const Matrix<3> covariance = covariance_between(chain, first, poses.size() - 1);
     const std::optional<Loop> loop = measured_loop(poses, first, covariance);
     if (!loop) continue;
-    const SE2 seen = smooth[loop->first].inverse() * smooth[loop->last];
+    const SE2 seen = poses[loop->first].inverse() * poses[loop->last];
     const Vector<3> error = cairn::local(seen, loop->T_first_last);
     const cairn::Cholesky<3> root(Matrix<3>(covariance + loop->covariance));
     if (!root.good() || root.whiten(error).squaredNorm() > options.gate) continue;

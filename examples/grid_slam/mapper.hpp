@@ -81,12 +81,6 @@ struct StepRecord {
   cairn::Gaussian<cairn::SE2> pose;
 };
 
-/// What odometry said of the way to a processed scan from the one before, by the direction of travel.
-struct WayThere {
-  cairn::SE2 forwards, backwards;
-  cairn::Matrix<3> noise = cairn::Matrix<3>::Zero();  ///< of either, on its right
-};
-
 /// What a run asks of a saved map; what it does not ask for is as it was.
 struct MapRequest {
   std::optional<double> cell_size{};       ///< refused where the map has another
@@ -164,10 +158,6 @@ private:
   void accumulate(const cairn::SE2& moved);
   void process(const cairn::StampedScan& scan);
   [[nodiscard]] cairn::Matrix<3> motion_noise() const;
-  [[nodiscard]] std::optional<cairn::Gaussian<cairn::SE2>> instead_of_jump(
-      const std::vector<cairn::SE2>& poses, std::size_t pose, const cairn::SE2& step) const;
-  [[nodiscard]] StepChain chain_of(const std::vector<cairn::PathPose<cairn::SE2>>& path) const;
-  [[nodiscard]] std::vector<cairn::SE2> without_jumps(const std::vector<cairn::SE2>& poses) const;
   void look_for_loop();
   [[nodiscard]] std::vector<std::size_t> old_places(const std::vector<cairn::SE2>& poses,
                                                     const StepChain& chain) const;
@@ -186,7 +176,6 @@ private:
   std::optional<cairn::Gaussian<cairn::SE2>> start_;
   std::vector<StepRecord> steps_;
   std::vector<std::vector<cairn::ScanPoint>> points_;  // of the processed scans
-  std::vector<WayThere> ways_;                         // to the processed scans
   std::vector<double> travelled_;                      // [m] at each pose of the path
   std::vector<cairn::StampedScan> scans_;
   std::vector<Loop> loops_;
