@@ -5,6 +5,7 @@
 /// A pose for every scan, of which a mapper has processed some.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -15,13 +16,18 @@
 namespace grid_slam {
 
 /// Between the processed scans the path follows odometry, and the gap to the next one is spread along the
-/// way. `processed(k)` is the scan of pose(k), in rising order, from the first scan on.
+/// way: by metres plus radians, for a robot that stands does not err. `processed(k)` is the scan of pose(k),
+/// in rising order, from the first scan on.
 template <class Processed, class Pose>
 [[nodiscard]] std::vector<cairn::StampedPose2> filled_path(const std::vector<cairn::StampedScan>& scans,
                                                            std::size_t count, const Processed& processed,
                                                            const Pose& pose) {
   using cairn::SE2;
   using cairn::Vector;
+  const auto way = [&](std::size_t i) {  // from scan i to the next
+    const SE2 moved = scans[i].T_odom_laser.inverse() * scans[i + 1].T_odom_laser;
+    return moved.translation().norm() + std::abs(moved.angle());
+  };
   std::vector<cairn::StampedPose2> all;
   all.reserve(scans.size());
   for (std::size_t k = 0; k < count; ++k) {
@@ -30,10 +36,13 @@ template <class Processed, class Pose>
     const SE2 odometry = scans[from].T_odom_laser.inverse();
     Vector<3> gap = Vector<3>::Zero();
     if (k + 1 < count) gap = cairn::local(SE2(pose(k) * (odometry * scans[to].T_odom_laser)), pose(k + 1));
+    double whole = 0, gone = 0;
+    for (std::size_t i = from; i < to && i + 1 < scans.size(); ++i) whole += way(i);
     for (std::size_t i = from; i < to; ++i) {
-      const double share = static_cast<double>(i - from) / static_cast<double>(to - from);
       const SE2 moved = pose(k) * (odometry * scans[i].T_odom_laser);
+      const double share = whole > 0 ? gone / whole : 0;
       all.push_back({scans[i].time, cairn::retract(moved, Vector<3>(share * gap))});
+      if (i + 1 < to) gone += way(i);
     }
   }
   return all;

@@ -37,7 +37,8 @@ double clipped(double x0, double y0, double x1, double y1, CellAddress cell) {
 }  // namespace
 
 TEST_SUITE("grid/ray") {
-  TEST_CASE("ray: walk_cells goes through the cells of walk_ray, through corners too") {
+  TEST_CASE(
+      "ray: walk_cells, walk_rows and walk_columns go through the cells of walk_ray, through corners too") {
     const std::uint64_t seed = cairn_test::seed(9);
     CAPTURE(seed);
     Random random(seed);
@@ -52,6 +53,18 @@ TEST_SUITE("grid/ray") {
       walk_ray(x0, y0, x1, y1, [&](CellAddress cell, double) { with_lengths.push_back(cell); });
       walk_cells(x0, y0, x1, y1, [&](CellAddress cell) { without.push_back(cell); });
       REQUIRE(with_lengths == without);
+      std::vector<CellAddress> by_rows, by_columns;
+      walk_rows(x0, y0, x1, y1, [&](std::int32_t row, std::int32_t first, std::int32_t last) {
+        REQUIRE(first <= last);
+        for (std::int32_t column = first; column <= last; ++column) by_rows.push_back({column, row});
+      });
+      walk_columns(x0, y0, x1, y1, [&](std::int32_t column, std::int32_t first, std::int32_t last) {
+        REQUIRE(first <= last);
+        for (std::int32_t row = first; row <= last; ++row) by_columns.push_back({column, row});
+      });
+      for (auto* cells : {&without, &by_rows, &by_columns}) std::ranges::sort(*cells);
+      REQUIRE(by_rows == without);
+      REQUIRE(by_columns == without);
     }
   }
 

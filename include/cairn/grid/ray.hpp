@@ -103,4 +103,61 @@ void walk_cells(double x0, double y0, double x1, double y1, Visit&& visit) {
   }
 }
 
+namespace detail {
+
+/// The cells of walk_cells as runs along one axis, a run for each step across it. `passes(next, border)` says
+/// whether the border at the share `next` of the segment is crossed before the one across, at `border`.
+template <class Passes, class Visit>
+void walk_runs(double along0, double across0, double along1, double across1, const Passes& passes,
+               Visit&& visit) {
+  const auto cell_of = [](double x) { return static_cast<std::int32_t>(std::floor(x)); };
+  const auto border_at = [](std::int32_t cell, std::int32_t border, double from, double inverse) {
+    return std::min(1.0, (cell + border - from) * inverse);
+  };
+  const double inverse = 1 / (along1 - along0), inverse_across = 1 / (across1 - across0);
+  std::int32_t from = cell_of(along0), across = cell_of(across0);
+  const std::int32_t last = cell_of(along1), last_across = cell_of(across1);
+  const std::int32_t step = last < from ? -1 : 1, border = last < from ? 0 : 1;
+  const std::int32_t step_across = last_across < across ? -1 : 1,
+                     border_across = last_across < across ? 0 : 1;
+  const std::int32_t low = std::min(from, last), high = std::max(from, last);
+  for (; across != last_across; across += step_across) {
+    const double until = border_at(across, border_across, across0, inverse_across);
+    const auto crossed = [&](std::int32_t cell) {
+      return passes(border_at(cell, border, along0, inverse), until);
+    };
+    const double place = along0 + until * (along1 - along0);
+    auto to = static_cast<std::int32_t>(place);
+    if (place < to) --to;
+    // Rounding decides as it does cell by cell, where it decides at all.
+    constexpr double unsure = 1e-5;  // cells; 2^28 of them leave 6e-8
+    if (const double beyond = place - to; beyond < unsure || beyond > 1 - unsure) {
+      to = std::clamp(to, low, high);
+      if ((to - from) * step < 0) to = from;
+      while (to != last && crossed(to)) to += step;
+      while (to != from && !crossed(to - step)) to -= step;
+    }
+    visit(across, std::min(from, to), std::max(from, to));
+    from = to;
+  }
+  visit(across, std::min(from, last), std::max(from, last));
+}
+
+}  // namespace detail
+
+/// The cells of walk_cells, row by row: visit(row, first column, last column). A visit for each row instead
+/// of one for each cell: for segments that are rather level.
+template <class Visit>
+void walk_rows(double x0, double y0, double x1, double y1, Visit&& visit) {
+  detail::check_ray(x0, y0, x1, y1);
+  detail::walk_runs(x0, y0, x1, y1, [](double next, double border) { return next <= border; }, visit);
+}
+
+/// The same, column by column: visit(column, first row, last row), for segments that are rather upright.
+template <class Visit>
+void walk_columns(double x0, double y0, double x1, double y1, Visit&& visit) {
+  detail::check_ray(x0, y0, x1, y1);
+  detail::walk_runs(y0, x0, y1, x1, [](double next, double border) { return next < border; }, visit);
+}
+
 }}  // namespace cairn::CAIRN_ABI

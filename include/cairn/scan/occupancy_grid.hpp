@@ -170,9 +170,20 @@ private:
     }
 
     void ray(const Point& end) {
-      walk_cells(start_.column, start_.row, end.column, end.row, [&](CellAddress cell) {
-        tile(cell).passed[static_cast<std::size_t>(cell.row & 31)] |= bit(cell);
-      });
+      if (std::abs(end.column - start_.column) >= std::abs(end.row - start_.row))
+        walk_rows(start_.column, start_.row, end.column, end.row,
+                  [&](std::int32_t row, std::int32_t first, std::int32_t last) {
+                    for_each_word(first, last, [&](std::int32_t column, std::uint32_t bits) {
+                      tile({column, row}).passed[static_cast<std::size_t>(row & 31)] |= bits;
+                    });
+                  });
+      else
+        walk_columns(start_.column, start_.row, end.column, end.row,
+                     [&](std::int32_t column, std::int32_t first, std::int32_t last) {
+                       for_each_word(first, last, [&](std::int32_t row, std::uint32_t bits) {
+                         tile({column, row}).upright[static_cast<std::size_t>(column & 31)] |= bits;
+                       });
+                     });
     }
     void hit(const Point& end) {
       tile(end.cell).passed[static_cast<std::size_t>(end.cell.row & 31)] |= bit(end.cell);
@@ -182,10 +193,15 @@ private:
     /// visit(tile, cells) with cells(f) calling f(place in the tile, whether stopped), for every tile with a
     /// mark.
     template <class Visit>
-    void for_each_tile(const Visit& visit) const {
+    void for_each_tile(const Visit& visit) {
       for (std::int32_t t = 0; t < columns_ * rows_; ++t) {
-        const Tile& marks = tiles_[static_cast<std::size_t>(t)];
-        std::uint32_t any = 0;
+        Tile& marks = tiles_[static_cast<std::size_t>(t)];
+        std::uint32_t any = 0, upright = 0;
+        for (const std::uint32_t column : marks.upright) upright |= column;
+        if (upright != 0) {
+          turn(marks.upright);
+          for (std::size_t row = 0; row < tile_side; ++row) marks.passed[row] |= marks.upright[row];
+        }
         for (const std::uint32_t row : marks.passed) any |= row;
         if (any == 0) continue;
         visit(TileAddress{first_.column + t % columns_, first_.row + t / columns_}, [&](const auto& f) {
@@ -203,7 +219,28 @@ private:
   private:
     struct Tile {
       std::array<std::uint32_t, tile_side> passed{}, stopped{};  // a bit a column
+      std::array<std::uint32_t, tile_side> upright{};            // passed, a word a column and a bit a row
     };
+    /// Calls visit(cell, bits) for the words of 32 cells that hold a run.
+    template <class Visit>
+    static void for_each_word(std::int32_t first, std::int32_t last, const Visit& visit) {
+      while ((first ^ last) >> 5 != 0) {
+        visit(first, ~std::uint32_t{0} << static_cast<std::uint32_t>(first & 31));
+        first = (first | 31) + 1;
+      }
+      visit(first, (~std::uint32_t{0} << static_cast<std::uint32_t>(first & 31)) &
+                       (~std::uint32_t{0} >> static_cast<std::uint32_t>(31 - (last & 31))));
+    }
+    /// Rows become columns: squares of 16, 8, ... 1 bits beside the diagonal change places.
+    static void turn(std::array<std::uint32_t, tile_side>& words) noexcept {
+      std::uint32_t mask = 0x0000ffffU;
+      for (std::uint32_t side = 16; side != 0; side >>= 1U, mask ^= mask << side)
+        for (std::uint32_t k = 0; k < tile_side; k = (k + side + 1) & ~side) {
+          const std::uint32_t changed = ((words[k] >> side) ^ words[k + side]) & mask;
+          words[k] ^= changed << side;
+          words[k + side] ^= changed;
+        }
+    }
     [[nodiscard]] static std::uint32_t bit(CellAddress cell) noexcept {
       return std::uint32_t{1} << static_cast<std::uint32_t>(cell.column & 31);
     }
