@@ -94,9 +94,12 @@ Results run(const Drive& drive, const RunOptions& options,
   sensor.sigma = drive.options.detector.sigma;
   const Map empty(sensor, options.landmarks);
   Belief belief(drive.truth.front(), empty, options.particles);
-  const cairn::ConditionalFilter filter{
-      .resample_below = options.resample_below, .seed = options.seed, .threads = options.threads};
-  const cairn::FromLandmarks proposal{.associations = 2, .hypotheses = 5};
+  const cairn::ConditionalFilter filter{.resample_below = options.resample_below,
+                                        .redraw = true,
+                                        .seed = options.seed,
+                                        .threads = options.threads};
+  const cairn::FromLandmarks proposal{
+      .weight = cairn::FromLandmarks::Weight::evidence, .associations = 2, .hypotheses = 20};
   std::vector<SE3> odometry;
   for (const Frame& frame : drive.frames) {
     const auto motion = [&](const SE3& x, std::size_t) {

@@ -62,7 +62,7 @@ struct LineSighting {
 struct MatchingOptions {
   double sigma = 0.5;                 ///< of a segment's ends across it [pixels]
   double nearest = 1, farthest = 30;  ///< [m]
-  double overlap = 0.5;    ///< least share that two cameras both saw of what either saw of the line
+  double overlap = 0.8;    ///< least share that two cameras both saw of what either saw of the line
   double of_overlap = 20;  ///< what the rest of that share costs, in units of the residual's chi^2
   double doubt = 4;        ///< two matches that share a segment must differ by so much, else none is taken
   double gate = 0.99;      ///< share of true matches whose residual is inside

@@ -403,6 +403,17 @@ private:
     }
   }
 
+  /// Another newest pose of the same density.
+  void redraw(std::size_t particle, Random& random) {
+    Particle& p = particles_.states[particle];
+    PathPose<Pose> other = paths_.at(p.node);
+    other.pose = other.drawn = sample(other.drawn_from, random);
+    const std::uint32_t node = paths_.extend(paths_.parent(p.node), std::move(other));
+    paths_.release(p.node);
+    p.node = node;
+    p.pose = paths_.at(node).pose;
+  }
+
   void resample(Resampling scheme, Random& random) {
     choose(resampled_indices(particles_.weights(), size(), scheme, random));
   }
@@ -439,6 +450,10 @@ struct ConditionalFilter {
   /// How much of a step's log weight counts. 1 is the model as it is written; less where the model errs in
   /// the same way at every step, so that evidence of many steps is not worth as many times one.
   double evidence_share = 1;
+  /// Copies of a particle that resampling makes draw poses of their own from what the first was drawn from:
+  /// as many different poses as particles. Right where a weight does not depend on which pose was drawn, such
+  /// as FromLandmarks::Weight::evidence.
+  bool redraw = false;
   bool insert = true;  ///< false localises in maps that stay as they are
   std::uint64_t seed = 0;
   unsigned threads = 1;
@@ -469,7 +484,15 @@ struct ConditionalFilter {
     result.effective_size = belief.particles_.effective_size();
     if (result.effective_size < resample_below * static_cast<double>(belief.size())) {
       Random random(seed, stream(belief.steps(), all_particles));
+      std::vector<std::size_t> copies;
       belief.resample(scheme, random);
+      if (redraw)
+        for (std::size_t i = 1; i < belief.size(); ++i)
+          if (belief[i].node == belief[i - 1].node) copies.push_back(i);
+      for (const std::size_t i : copies) {
+        Random own(seed, stream(belief.steps(), belief.size() + i));
+        belief.redraw(i, own);
+      }
       result.resampled = true;
     }
     if (insert) insert_in_all(belief, z);

@@ -47,6 +47,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -256,6 +257,15 @@ public:
   /// an identity too large.
   [[nodiscard]] Chosen<Choice> associate(const Gaussian<Pose>& x, const Observation& z, Random& random) const;
 
+  /// What each of some sightings may be of, by the gates about one pose. To be asked again about another.
+  class Candidates;
+  [[nodiscard]] Candidates candidates(const Gaussian<Pose>& x, const Observation& z) const;
+  /// Of the same candidates those inside their gates about this pose, with their densities there.
+  [[nodiscard]] Candidates narrowed(const Candidates& candidates, const Gaussian<Pose>& x,
+                                    const Observation& z) const;
+  /// Of all assignments to candidates the likeliest.
+  [[nodiscard]] Chosen<Choice> likeliest(const Candidates& candidates) const;
+
   /// The same at a known pose, with its likelihood: for FromMotion.
   [[nodiscard]] Chosen<Choice> choose(const Pose& x, const Observation& z, Random& random) const {
     return associate(known(x), z, random);
@@ -264,7 +274,7 @@ public:
   [[nodiscard]] double log_likelihood(const Pose& x, const Observation& z, const Choice& n) const;
   /// log p(z, n | x, m) of the likeliest n.
   [[nodiscard]] double log_likelihood(const Pose& x, const Observation& z) const {
-    return likeliest(candidates_of(known(x), z)).log_likelihood;
+    return likeliest(candidates(known(x), z)).log_likelihood;
   }
   /// log of the density of a sighting that is not of a landmark of the map.
   [[nodiscard]] double log_density_of(std::uint32_t not_a_landmark) const {
@@ -280,7 +290,7 @@ public:
   void insert(const Pose& x, const Observation& z, const Choice& n);
   /// The same with the likeliest association at this pose.
   void insert(const Pose& x, const Observation& z) {
-    insert(x, z, likeliest(candidates_of(known(x), z)).choice);
+    insert(x, z, likeliest(candidates(known(x), z)).choice);
   }
 
 private:
@@ -302,8 +312,6 @@ private:
     Candidate otherwise{};
     bool is_named = false;
   };
-  using Candidates = std::vector<Alternatives>;
-
   static constexpr int places = detail::place_size<Landmark>;
   static constexpr bool is_placed = places > 0;
 
@@ -316,7 +324,6 @@ private:
   }
   static Gaussian<Pose> known(const Pose& x) { return {x, CovarianceOf<Pose>::Zero(dof_of(x), dof_of(x))}; }
 
-  [[nodiscard]] Candidates candidates_of(const Gaussian<Pose>& x, const Observation& z) const;
   void check(const Observation& z) const;
   [[nodiscard]] bool begins(const Measurement& z) const {
     if constexpr (requires(const L& l) { l.determines(z); })
@@ -330,7 +337,6 @@ private:
   template <class Visit>
   void for_each_near(const Gaussian<Pose>& x, const Measurement& z, const std::vector<std::uint32_t>& near,
                      Visit&& visit) const;
-  [[nodiscard]] Chosen<Choice> likeliest(const Candidates& candidates) const;
   [[nodiscard]] static Chosen<Choice> drawn(const Candidates& candidates, Random& random);
 
   [[nodiscard]] std::optional<Gaussian<Landmark>> seen_first(const Pose& x, const Measurement& z) const;
@@ -349,6 +355,21 @@ private:
   std::size_t size_ = 0;
 };
 
+template <LandmarkSensor L, class F>
+class LandmarkMap<L, F>::Candidates {
+public:
+  [[nodiscard]] std::size_t size() const noexcept { return of.size(); }  ///< of the sightings
+  /// Calls visit(landmark, log density) for the landmarks that a sighting may be of.
+  template <class Visit>
+  void for_each(std::size_t sighting, Visit&& visit) const {
+    for (const Candidate& c : of[sighting].known) visit(c.landmark, c.log_density);
+  }
+
+private:
+  friend class LandmarkMap<L, F>;
+  std::vector<Alternatives> of{};
+};
+
 /// FastSLAM 2.0: the pose is drawn from what motion and sightings say of it together.
 ///
 /// Starting at the motion, q takes in the sightings of known landmarks one after the other, the surest first,
@@ -364,11 +385,11 @@ struct FromLandmarks {
   /// How often it is chosen which landmarks the sightings are of: with the pose as the motion leaves it, then
   /// again with the pose as that choice makes it, which tells neighbours apart that the motion cannot.
   int associations = 1;
-  /// Above 0: of the first choice only those stay that agree. So many of the surest are taken in alone, one
-  /// at a time, and the one whose pose has most of the others inside their gates decides; the rest are called
-  /// clutter (J. Civera, O. Grasa, A. Davison, J. Montiel, "1-point RANSAC for EKF filtering", IROS 2009).
-  /// Where the motion leaves more room than neighbours are apart. With Pick::drawn the probability of the
-  /// choice is then no longer what is divided by.
+  /// Above 0: the motion leaves more room than neighbours are apart. So many candidates of sightings, those
+  /// of sightings that have several first, are taken in alone; each decides what the other sightings are of,
+  /// and the decision under which all are likeliest together stays (after J. Civera, O. Grasa, A. Davison,
+  /// J. Montiel, "1-point RANSAC for EKF filtering", IROS 2009, who count). With Pick::drawn the probability
+  /// of the choice is then no longer what is divided by.
   int hypotheses = 0;
 
   /// Throws Error where the motion's covariance is singular: then use FromMotion, or say how the wheels slip.
@@ -382,8 +403,8 @@ struct FromLandmarks {
       raise(
           "FromLandmarks: expected a motion that is uncertain in every direction, found a singular "
           "covariance");
-    Chosen<Association> chosen = map.associate(motion, z, random);
-    if (hypotheses > 0) keep_agreeing(chosen.choice, motion, map, z);
+    Chosen<Association> chosen =
+        hypotheses > 0 ? best_explained(motion, map, z) : map.associate(motion, z, random);
     Gaussian<typename L::State> q = motion;
     double log_evidence = take_in(q, map, z, chosen.choice);
     for (int again = 1; again < associations; ++again) {
@@ -409,54 +430,81 @@ struct FromLandmarks {
 private:
   struct Known {
     std::size_t sighting;
+    std::uint32_t landmark;
     double log_volume;
   };
   static void sort_surest_first(std::vector<Known>& known) {
     std::sort(known.begin(), known.end(), [](const Known& a, const Known& b) {
-      return a.log_volume < b.log_volume || (a.log_volume == b.log_volume && a.sighting < b.sighting);
+      return std::tie(a.log_volume, a.sighting, a.landmark) < std::tie(b.log_volume, b.sighting, b.landmark);
     });
   }
 
+  /// A candidate to begin with.
+  struct Beginning {
+    std::size_t sighting;
+    std::uint32_t landmark;
+    bool is_alone;      // the only candidate
+    double log_volume;  // of the uncertainty of where the landmark is seen
+  };
   template <LandmarkSensor L, class F>
-  void keep_agreeing(Association& n, const Gaussian<typename L::State>& motion, const LandmarkMap<L, F>& map,
-                     const typename LandmarkMap<L, F>::Observation& z) const {
+  [[nodiscard]] std::vector<Beginning> beginnings(const LandmarkMap<L, F>& map,
+                                                  const typename LandmarkMap<L, F>::Candidates& candidates,
+                                                  const typename L::State& x,
+                                                  const typename LandmarkMap<L, F>::Observation& z) const {
     using Model = detail::ModelOf<L>;
-    std::vector<Known> known;
-    for (std::size_t k = 0; k < z.size(); ++k)
-      if (const auto* landmark = map.find(n[k])) {
+    std::vector<Beginning> all;
+    for (std::size_t k = 0; k < z.size(); ++k) {
+      const std::size_t first = all.size();
+      candidates.for_each(k, [&](std::uint32_t n, double) {
         const auto& model = detail::model_of(map.sensor(), z[k].z);
-        const detail::SensorOfPose<Model> sensor{model, landmark->belief};
-        known.push_back(
-            {k, Cholesky<dof<typename Model::Measurement>>(sensor.noise(motion.mean)).log_determinant()});
-      }
-    sort_surest_first(known);
-    std::vector<bool> best, agrees(z.size());
-    std::size_t most = 0;
-    for (std::size_t h = 0; h < known.size() && h < static_cast<std::size_t>(hypotheses); ++h) {
-      Gaussian<typename L::State> q = motion;
-      const std::size_t first = known[h].sighting;
-      const auto& model = detail::model_of(map.sensor(), z[first].z);
-      const auto in = Extended{.iterations = iterations}.update(
-          q, detail::SensorOfPose<Model>{model, map.find(n[first])->belief},
-          detail::measured<L>(model, z[first].z));
-      if (!in.accepted()) continue;
-      std::size_t count = 0;
-      for (const Known& each : known) {
-        agrees[each.sighting] = map.agrees(q, z[each.sighting].z, n[each.sighting]);
-        count += agrees[each.sighting];
-      }
-      if (count <= most) continue;
-      most = count;
-      best = agrees;
+        const detail::SensorOfPose<Model> sensor{model, map.find(n)->belief};
+        all.push_back(
+            {k, n, false, Cholesky<dof<typename Model::Measurement>>(sensor.noise(x)).log_determinant()});
+      });
+      if (all.size() == first + 1) all.back().is_alone = true;
     }
-    for (const Known& each : known)
-      if (most > 0 && !best[each.sighting] && !z[each.sighting].identity) n[each.sighting] = no_landmark;
+    std::sort(all.begin(), all.end(), [](const Beginning& a, const Beginning& b) {
+      return std::tie(a.is_alone, a.log_volume, a.sighting, a.landmark) <
+             std::tie(b.is_alone, b.log_volume, b.sighting, b.landmark);
+    });
+    if (all.size() > static_cast<std::size_t>(hypotheses)) all.erase(all.begin() + hypotheses, all.end());
+    return all;
   }
 
-  /// Returns the sum of the innovations' log densities.
+  template <LandmarkSensor L, class F>
+  [[nodiscard]] Chosen<Association> best_explained(const Gaussian<typename L::State>& motion,
+                                                   const LandmarkMap<L, F>& map,
+                                                   const typename LandmarkMap<L, F>::Observation& z) const {
+    using Model = detail::ModelOf<L>;
+    const auto candidates = map.candidates(motion, z);
+    Chosen<Association> best = map.likeliest(candidates);
+    Gaussian<typename L::State> q = motion;
+    double most = take_in(q, map, z, best.choice);
+    std::vector<Association> tried{best.choice};
+    for (const Beginning& each : beginnings(map, candidates, motion.mean, z)) {
+      q = motion;
+      const auto& model = detail::model_of(map.sensor(), z[each.sighting].z);
+      const auto in = Extended{.iterations = iterations}.update(
+          q, detail::SensorOfPose<Model>{model, map.find(each.landmark)->belief},
+          detail::measured<L>(model, z[each.sighting].z));
+      if (!in.accepted()) continue;
+      Chosen<Association> chosen = map.likeliest(map.narrowed(candidates, q, z));
+      if (std::find(tried.begin(), tried.end(), chosen.choice) != tried.end()) continue;
+      tried.push_back(chosen.choice);
+      q = motion;
+      const double log_evidence = take_in(q, map, z, chosen.choice);
+      if (!(log_evidence > most)) continue;
+      most = log_evidence;
+      best = std::move(chosen);
+    }
+    return best;
+  }
+
+  /// What lies outside its gate about the pose as the surer ones leave it is called clutter. Returns the sum
+  /// of the innovations' log densities.
   template <LandmarkSensor L, class F>
   double take_in(Gaussian<typename L::State>& q, const LandmarkMap<L, F>& map,
-                 const typename LandmarkMap<L, F>::Observation& z, const Association& n) const {
+                 const typename LandmarkMap<L, F>::Observation& z, Association& n) const {
     using Model = detail::ModelOf<L>;
     double log_evidence = 0;
     std::vector<Known> known;
@@ -469,13 +517,18 @@ private:
       const auto& model = detail::model_of(map.sensor(), z[k].z);
       const detail::SensorOfPose<Model> sensor{model, landmark->belief};
       known.push_back(
-          {k, Cholesky<dof<typename Model::Measurement>>(sensor.noise(q.mean)).log_determinant()});
+          {k, n[k], Cholesky<dof<typename Model::Measurement>>(sensor.noise(q.mean)).log_determinant()});
     }
     sort_surest_first(known);
     const Extended filter{.iterations = iterations};
     for (const Known& each : known) {
-      const auto& landmark = map.find(n[each.sighting])->belief;
+      const auto& landmark = map.find(each.landmark)->belief;
       const auto& model = detail::model_of(map.sensor(), z[each.sighting].z);
+      if (!z[each.sighting].identity && !map.agrees(q, z[each.sighting].z, each.landmark)) {
+        n[each.sighting] = no_landmark;
+        log_evidence += map.log_density_of(no_landmark);
+        continue;
+      }
       const auto in = filter.update(q, detail::SensorOfPose<Model>{model, landmark},
                                     detail::measured<L>(model, z[each.sighting].z));
       if (in.accepted()) log_evidence += in.log_likelihood();
@@ -516,12 +569,13 @@ auto LandmarkMap<L, F>::candidate(const Gaussian<Pose>& x, const Measurement& z,
 }
 
 template <LandmarkSensor L, class F>
-auto LandmarkMap<L, F>::candidates_of(const Gaussian<Pose>& x, const Observation& z) const -> Candidates {
+auto LandmarkMap<L, F>::candidates(const Gaussian<Pose>& x, const Observation& z) const -> Candidates {
   check(z);
-  Candidates all(z.size());
+  Candidates all;
+  all.of.resize(z.size());
   const std::vector<std::uint32_t> near = is_placed ? std::vector<std::uint32_t>{} : in_reach(x.mean);
   for (std::size_t k = 0; k < z.size(); ++k) {
-    Alternatives& of = all[k];
+    Alternatives& of = all.of[k];
     of.is_named = z[k].identity.has_value();
     const double gate = of.is_named ? common_->gate_of_named : common_->gate;
     const auto add = [&](std::uint32_t number) {
@@ -588,30 +642,46 @@ void LandmarkMap<L, F>::for_each_near(const Gaussian<Pose>& x, const Measurement
 }
 
 template <LandmarkSensor L, class F>
+auto LandmarkMap<L, F>::narrowed(const Candidates& candidates, const Gaussian<Pose>& x,
+                                 const Observation& z) const -> Candidates {
+  CAIRN_EXPECTS(candidates.of.size() == z.size(), "narrowed needs the sightings that the candidates are of");
+  Candidates left = candidates;
+  for (std::size_t k = 0; k < z.size(); ++k) {
+    left.of[k].known.clear();
+    for (const Candidate& c : candidates.of[k].known)
+      if (const auto still = candidate(x, z[k].z, c.landmark,
+                                       candidates.of[k].is_named ? common_->gate_of_named : common_->gate))
+        left.of[k].known.push_back(*still);
+  }
+  return left;
+}
+
+template <LandmarkSensor L, class F>
 Chosen<Association> LandmarkMap<L, F>::likeliest(const Candidates& candidates) const {
   std::vector<std::uint32_t> columns;
-  for (const Alternatives& of : candidates)
+  for (const Alternatives& of : candidates.of)
     for (const Candidate& c : of.known) columns.push_back(c.landmark);
   std::sort(columns.begin(), columns.end());
   columns.erase(std::unique(columns.begin(), columns.end()), columns.end());
-  const std::size_t rows = candidates.size(), width = columns.size() + rows;
+  const std::size_t rows = candidates.of.size(), width = columns.size() + rows;
   std::vector<double> costs(rows * width, std::numeric_limits<double>::infinity());
   for (std::size_t k = 0; k < rows; ++k) {
-    for (const Candidate& c : candidates[k].known) {
+    for (const Candidate& c : candidates.of[k].known) {
       const auto at = std::lower_bound(columns.begin(), columns.end(), c.landmark);
       costs[k * width + static_cast<std::size_t>(at - columns.begin())] = -c.log_density;
     }
     constexpr double only_if_taken = 1e9;
-    const bool has_name = candidates[k].is_named && !candidates[k].known.empty();
-    costs[k * width + columns.size() + k] = has_name ? only_if_taken : -candidates[k].otherwise.log_density;
+    const bool has_name = candidates.of[k].is_named && !candidates.of[k].known.empty();
+    costs[k * width + columns.size() + k] =
+        has_name ? only_if_taken : -candidates.of[k].otherwise.log_density;
   }
   const auto assigned = best_assignment(costs, rows);
   Chosen<Association> result;
   for (std::size_t k = 0; k < rows; ++k) {
     const std::size_t column = (*assigned)[k];
     const bool is_known = column < columns.size();
-    result.choice.push_back(is_known ? columns[column] : candidates[k].otherwise.landmark);
-    result.log_likelihood += is_known ? -costs[k * width + column] : candidates[k].otherwise.log_density;
+    result.choice.push_back(is_known ? columns[column] : candidates.of[k].otherwise.landmark);
+    result.log_likelihood += is_known ? -costs[k * width + column] : candidates.of[k].otherwise.log_density;
   }
   return result;
 }
@@ -622,7 +692,7 @@ Chosen<Association> LandmarkMap<L, F>::drawn(const Candidates& candidates, Rando
   const auto taken = [&](std::uint32_t landmark) {
     return std::find(result.choice.begin(), result.choice.end(), landmark) != result.choice.end();
   };
-  for (const Alternatives& of : candidates) {
+  for (const Alternatives& of : candidates.of) {
     std::vector<Candidate> free;
     for (const Candidate& c : of.known)
       if (!taken(c.landmark)) free.push_back(c);
@@ -644,8 +714,8 @@ Chosen<Association> LandmarkMap<L, F>::drawn(const Candidates& candidates, Rando
 template <LandmarkSensor L, class F>
 Chosen<Association> LandmarkMap<L, F>::associate(const Gaussian<Pose>& x, const Observation& z,
                                                  Random& random) const {
-  const Candidates candidates = candidates_of(x, z);
-  return options().pick == Pick::drawn ? drawn(candidates, random) : likeliest(candidates);
+  const Candidates all = candidates(x, z);
+  return options().pick == Pick::drawn ? drawn(all, random) : likeliest(all);
 }
 
 template <LandmarkSensor L, class F>
