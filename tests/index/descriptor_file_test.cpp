@@ -31,9 +31,10 @@ std::string saved(const Index& index) {
   cairn::save_tree(out, index);
   return out.str();
 }
-Index loaded(const std::string& bytes, const Points& points) {
+Index loaded(const std::string& bytes, const Points& points,
+             const cairn::DescriptorIndexOptions& options = {}) {
   std::istringstream in(bytes);
-  return cairn::load_tree<Index>(in, "a.index", points);
+  return cairn::load_tree<Index>(in, "a.index", points, options);
 }
 std::string refusal(const std::string& bytes, const Points& points) {
   return cairn_test::message_of([&] { static_cast<void>(loaded(bytes, points)); });
@@ -62,15 +63,18 @@ TEST_SUITE("descriptor_file") {
   TEST_CASE("descriptor_file: a loaded index answers as the saved one, under budgets too, and grows on") {
     const auto numbers = numbers_of(3000);
     const Points half{std::span(numbers).first(1500 * dim), dim}, all(numbers, dim);
-    for (const bool changed : {false, true}) {
+    for (const int variant : {0, 1, 2}) {
+      const bool changed = variant == 1;
+      const auto codes = variant == 2 ? cairn::DescriptorCodes::on : cairn::DescriptorCodes::off;
       Points set = half;
-      Index index(set, {.points_in_cell = 24});
+      Index index(set, {.points_in_cell = 24, .codes = codes});
       if (changed) {
         set = Points(std::span(numbers).first(2000 * dim), dim);
         index.insert(1500, 500);
         for (cairn::PointId id = 0; id < 300; ++id) REQUIRE(index.erase(3 * id));
       }
-      Index again = loaded(saved(index), all);
+      Index again = loaded(saved(index), all, {.codes = codes});
+      REQUIRE(again.coded() == (variant == 2));
       REQUIRE(again.size() == index.size());
       REQUIRE(again.cells() == index.cells());
       cairn::Random random(cairn_test::seed(5));

@@ -28,10 +28,119 @@ namespace {
 
 using Points = cairn::Rows<float>;
 using Index = cairn::DescriptorIndex<Points>;
+constexpr auto with_and_without_codes = {cairn::DescriptorCodes::off, cairn::DescriptorCodes::on};
+
+/// What one search under a budget got wrong of k nearest: a distance that is not that of its point, an order
+/// that is none, an answer called exact that is not, nothing found though a block could be looked at.
+std::size_t wrong_answers(const Index& index, const Points& points, const std::vector<float>& query,
+                          std::size_t k, std::size_t leaves, Index::Search& search) {
+  std::vector<cairn::Neighbor<float>> found(k);
+  cairn::KNearest<float> collector(found.data(), k);
+  cairn::Work work;
+  const bool all = search.search(index, query, collector, {.leaves = leaves}, &work);
+  collector.restore(cairn::L2{});
+  const std::size_t count = collector.size();
+  std::size_t wrong = work.leaves > leaves;
+  wrong += count == 0 && leaves > 0;
+  wrong += count == 0 && all;
+  std::set<cairn::PointId> ids;
+  for (std::size_t i = 0; i < count; ++i) {
+    double square = 0;
+    for (std::size_t a = 0; a < query.size(); ++a)
+      square += std::pow(double{query[a]} - double{points[found[i].id][a]}, 2);
+    wrong += std::abs(std::sqrt(square) - double{found[i].distance}) > 1e-5 * (1e-6 + std::sqrt(square));
+    wrong += !ids.insert(found[i].id).second;
+    wrong += i > 0 && found[i].distance < found[i - 1].distance;
+  }
+  if (!all) return wrong;
+  const auto expected = cairn::BruteForce<float>(points).nearest(query, k);
+  wrong += count != expected.size();
+  for (std::size_t i = 0; i < std::min(count, expected.size()); ++i)
+    wrong += std::abs(found[i].distance - expected[i].distance) > 1e-5F * (1e-6F + expected[i].distance);
+  return wrong;
+}
 
 }  // namespace
 
 TEST_SUITE("descriptor_index") {
+  TEST_CASE("an answer called exact is so, with codes and without, under any budget, among equals too") {
+    const std::uint64_t seed = cairn_test::seed(80);
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    Index::Search search;
+    std::vector<std::string> shapes = cairn_test::shapes();
+    shapes.insert(shapes.end(), {"bytes", "few", "ring"});
+    for (const std::string& shape : shapes)
+      for (const std::size_t dim : {1U, 5U, 33U, 66U})
+        for (const std::size_t in_cell : {1U, 6U, 40U}) {
+          CAPTURE(shape);
+          CAPTURE(dim);
+          CAPTURE(in_cell);
+          auto numbers = cairn_test::make_points<float>(shape, 500, dim, random);
+          if (shape == "bytes")
+            for (float& number : numbers) number = static_cast<float>(random.below(256));
+          if (shape == "few")  // a dozen places, each many times
+            for (std::size_t i = 12 * dim; i < numbers.size(); ++i) numbers[i] = numbers[i % (12 * dim)];
+          if (shape == "ring")  // all as far from the first query
+            for (std::size_t i = 0; i < numbers.size(); ++i)
+              numbers[i] = i % dim == i / dim % dim ? (i / dim % 2 == 0 ? 40.0F : 0.0F) : 20.0F;
+          const Points points(numbers, dim);
+          for (const auto codes : with_and_without_codes) {
+            const Index index(points, {.points_in_cell = in_cell, .codes = codes});
+            REQUIRE(index.coded() == (codes == cairn::DescriptorCodes::on));
+            for (int round = 0; round < 3; ++round) {
+              std::vector<float> query(dim, 20.0F);
+              if (round == 1) query.assign(numbers.begin(), numbers.begin() + static_cast<long>(dim));
+              if (round == 2) query = cairn_test::make_points<float>("uniform", 1, dim, random);
+              for (const std::size_t leaves : {0U, 1U, 2U, 3U, 5U, 9U, 20U, 40U, 100000U})
+                for (const std::size_t k : {1U, 2U, 7U})
+                  REQUIRE(wrong_answers(index, points, query, k, leaves, search) == 0);
+              cairn::Nearest<float> nearest;
+              REQUIRE(search.search(index, query, nearest));
+            }
+          }
+        }
+  }
+
+  TEST_CASE("codes spare bytes and lose few: the same budget finds nearly as much") {
+    cairn::Random random(cairn_test::seed(79));
+    std::vector<float> numbers(20000 * 96);
+    for (std::size_t i = 0; i < numbers.size(); i += 96) {
+      float hidden[12];
+      for (float& number : hidden) number = static_cast<float>(random.normal());
+      for (std::size_t a = 0; a < 96; ++a)
+        numbers[i + a] =
+            hidden[a % 12] * hidden[(a * a + 1) % 12] + 0.2F * static_cast<float>(random.normal());
+    }
+    const Points points(numbers, 96);
+    const Index plain(points, {.codes = cairn::DescriptorCodes::off});
+    const Index coded(points, {.codes = cairn::DescriptorCodes::on});
+    REQUIRE(plain.cells() == coded.cells());
+    CHECK(coded.bytes() < 20000 * (128 + 48 + 16) * 3 / 2);
+    const cairn::BruteForce<float> brute(points);
+    Index::Search search;
+    int of_plain = 0, of_coded = 0;
+    std::size_t looked_at = 0;
+    cairn::Work work;
+    for (std::size_t i = 0; i < 300; ++i) {
+      const std::size_t place = 96 * random.below(20000);
+      std::vector<float> query(&numbers[place], &numbers[place] + 96);
+      for (float& number : query) number += 0.5F * static_cast<float>(random.normal());
+      const auto expected = brute.nearest(query)->id;
+      cairn::Nearest<float> by_plain, by_coded;
+      search.search(plain, query, by_plain, {.leaves = 40});
+      search.search(coded, query, by_coded, {.leaves = 40}, &work);
+      looked_at += search.looked_at();
+      of_plain += by_plain.id() == expected;
+      of_coded += by_coded.id() == expected;
+    }
+    MESSAGE(of_plain << " of 300 found without codes, " << of_coded << " with them, bytes of " << looked_at
+                     << " of " << work.distances << " points looked at");
+    CHECK(of_plain > 150);
+    CHECK(of_coded >= of_plain - 6);
+    CHECK(looked_at < work.distances / 5);
+  }
+
   TEST_CASE("without a budget it answers like brute force, whatever the points") {
     cairn::Random random(cairn_test::seed(81));
     Index::Search search;
@@ -204,11 +313,14 @@ TEST_SUITE("descriptor_index") {
     const Index index(points);
     CHECK(index.cells() == 128);
     Index::Search search;
-    cairn::Nearest<float> nearest;
-    cairn::Work work;
-    CHECK(search.search(index, std::vector<float>(8, 0.3F), nearest, {}, &work));
-    CHECK(nearest.reduced() == 0);
-    CHECK(work.leaves == 2);
+    const Index coded(points, {.codes = cairn::DescriptorCodes::on});
+    for (const Index* searched : {&index, &coded}) {
+      cairn::Nearest<float> nearest;
+      cairn::Work work;
+      CHECK(search.search(*searched, std::vector<float>(8, 0.3F), nearest, {}, &work));
+      CHECK(nearest.reduced() == 0);
+      CHECK(work.leaves == 2);
+    }
   }
 
   TEST_CASE("it grows and shrinks like a set, whatever the points, and answers like brute force") {
@@ -216,12 +328,13 @@ TEST_SUITE("descriptor_index") {
     CAPTURE(seed);
     cairn::Random random(seed);
     for (const std::string& shape : cairn_test::shapes())
-      for (const std::size_t dim : {1U, 7U}) {
+      for (const std::size_t dim : {1U, 7U, 8U}) {
         CAPTURE(shape);
         CAPTURE(dim);
         const auto numbers = cairn_test::make_points<float>(shape, 1500, dim, random);
         Points points{std::span(numbers).first(100 * dim), dim};
-        Index index(points, {.points_in_cell = 12});
+        const auto codes = dim == 7 ? cairn::DescriptorCodes::on : cairn::DescriptorCodes::off;
+        Index index(points, {.points_in_cell = 12, .codes = codes});
         std::set<cairn::PointId> live;
         for (cairn::PointId id = 0; id < 100; ++id) live.insert(id);
         std::size_t known = 100;
@@ -293,6 +406,30 @@ TEST_SUITE("descriptor_index") {
     CHECK(of_grown > of_built - 30);
   }
 
+  TEST_CASE("an index that grows large takes to codes, and answers on") {
+    cairn::Random random(cairn_test::seed(78));
+    std::vector<float> numbers(34000 * 128);
+    for (float& number : numbers) number = static_cast<float>(random.below(100));
+    Points points{std::span(numbers).first(32000 * 128), 128};
+    Index index(points);
+    REQUIRE_FALSE(index.coded());
+    points = Points(numbers, 128);
+    index.insert(32000, 1000);
+    REQUIRE(index.coded());
+    index.insert(33000, 1000);
+    for (cairn::PointId id = 0; id < 32000; id += 2) index.erase(id);
+    const cairn::BruteForce<float> brute(points);
+    for (std::size_t i = 1; i < 34000; i += 3001) {
+      std::vector<float> query(&numbers[i * 128], &numbers[i * 128] + 128);
+      CHECK((index.nearest(query)->distance == 0) == (i >= 32000 || i % 2 == 1));
+      query[7] += 0.3F;
+      Index::Search search;
+      cairn::Nearest<float> nearest;
+      REQUIRE(search.search(index, query, nearest));
+      if (i % 2 == 1) CHECK(nearest.reduced() == doctest::Approx(0.09));
+    }
+  }
+
   TEST_CASE("points far outside of the first, of no byte's value, and whole regions erased") {
     cairn::Random random(cairn_test::seed(88));
     std::vector<float> numbers(4000);
@@ -303,44 +440,46 @@ TEST_SUITE("descriptor_index") {
     const auto first = [&](std::size_t count) {
       return Points(std::span<const float>(numbers).first(2 * count), 2);
     };
-    Points points = first(1000);
-    Index index(points, {.points_in_cell = 100});
-    REQUIRE(index.bytes_are_exact());
-    std::vector<float> live(numbers.begin(), numbers.begin() + 2000);
-    const auto check = [&] {
-      const Points left(live, 2);
-      const cairn::BruteForce<float> brute(left);
-      for (int i = 0; i < 300; ++i) {
-        const std::vector<float> query{static_cast<float>(2400 * random.uniform()) - 700,
-                                       static_cast<float>(2400 * random.uniform()) - 700};
-        const auto found = index.nearest(query, 3);
-        const auto expected = brute.nearest(query, 3);
-        for (std::size_t k = 0; k < 3; ++k)
-          REQUIRE(found[k].distance == doctest::Approx(expected[k].distance).epsilon(1e-5));
-        const std::vector<float> near{query[0] / 12 + 60, query[1] / 12 + 60};
-        REQUIRE(index.nearest(near)->distance ==
-                doctest::Approx(brute.nearest(near)->distance).epsilon(1e-5));
+    for (const auto codes : with_and_without_codes) {
+      Points points = first(1000);
+      Index index(points, {.points_in_cell = 100, .codes = codes});
+      REQUIRE(index.bytes_are_exact());
+      std::vector<float> live(numbers.begin(), numbers.begin() + 2000);
+      const auto check = [&] {
+        const Points left(live, 2);
+        const cairn::BruteForce<float> brute(left);
+        for (int i = 0; i < 300; ++i) {
+          const std::vector<float> query{static_cast<float>(2400 * random.uniform()) - 700,
+                                         static_cast<float>(2400 * random.uniform()) - 700};
+          const auto found = index.nearest(query, 3);
+          const auto expected = brute.nearest(query, 3);
+          for (std::size_t k = 0; k < 3; ++k)
+            REQUIRE(found[k].distance == doctest::Approx(expected[k].distance).epsilon(1e-5));
+          const std::vector<float> near{query[0] / 12 + 60, query[1] / 12 + 60};
+          REQUIRE(index.nearest(near)->distance ==
+                  doctest::Approx(brute.nearest(near)->distance).epsilon(1e-5));
+        }
+      };
+      for (const std::size_t known : {1000U, 1500U, 2000U}) {
+        points = first(known);
+        index.insert(static_cast<cairn::PointId>(live.size() / 2), known - live.size() / 2);
+        live.assign(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(2 * known));
+        check();
       }
-    };
-    for (const std::size_t known : {1000U, 1500U, 2000U}) {
-      points = first(known);
-      index.insert(static_cast<cairn::PointId>(live.size() / 2), known - live.size() / 2);
-      live.assign(numbers.begin(), numbers.begin() + static_cast<std::ptrdiff_t>(2 * known));
-      check();
-    }
-    CHECK_FALSE(index.bytes_are_exact());
-    for (const float side : {40.0F, 80.0F, 120.0F}) {  // of a stripe that is emptied
-      const std::size_t cells = index.cells();
-      live.clear();
-      for (cairn::PointId id = 0; id < 2000; ++id) {
-        if (points[id][0] < side)
-          index.erase(id);
-        else
-          live.insert(live.end(), {points[id][0], points[id][1]});
+      CHECK_FALSE(index.bytes_are_exact());
+      for (const float side : {40.0F, 80.0F, 120.0F}) {  // of a stripe that is emptied
+        const std::size_t cells = index.cells();
+        live.clear();
+        for (cairn::PointId id = 0; id < 2000; ++id) {
+          if (points[id][0] < side)
+            index.erase(id);
+          else
+            live.insert(live.end(), {points[id][0], points[id][1]});
+        }
+        REQUIRE(index.size() == live.size() / 2);
+        if (side > 100) CHECK(index.cells() < cells);
+        check();
       }
-      REQUIRE(index.size() == live.size() / 2);
-      if (side > 100) CHECK(index.cells() < cells);
-      check();
     }
   }
 

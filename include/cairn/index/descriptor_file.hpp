@@ -131,7 +131,7 @@ struct DescriptorAccess {
     std::uint64_t codes = fnv1a({});
     for (std::size_t c = 0; c < index.cells(); ++c)
       for (std::size_t i = 0; i < file.sizes[c]; ++i) {
-        index.cells_.members().get(index.cells_.first_block(c) * block_size + i, code.data());
+        index.cells_.get(c, i, code.data());
         codes = fnv1a(bytes_of(code), codes);
       }
     file.header = {.unit = index.unit_,
@@ -170,7 +170,7 @@ struct DescriptorAccess {
     std::iota(cells.order.begin(), cells.order.end(), 0U);
     cells.first.assign(1, 0);
     for (const std::uint32_t size : file.sizes) cells.first.push_back(cells.first.back() + size);
-    index.cells_ = ByteCells(dim, codes, file.ids, cells);
+    index.cells_ = ByteCells(dim, codes, file.ids, cells, index.codes_pay(index.size_), options.threads);
     return index;
   }
 };

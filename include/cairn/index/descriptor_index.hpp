@@ -23,6 +23,12 @@
 /// collector's limit by that much is measured again, exactly; where the bytes are the points (SIFT), nobody
 /// is. Without a budget the answers are those of BruteForce. Euclidean distances only.
 ///
+/// Large sets of many coordinates have codes of half a byte for four coordinates as well (product_codes.hpp):
+/// a search reads those, an eighth of the bytes, and looks at the bytes only of points that the codes make
+/// likely. Who is unlikely, but not proven farther than the limit, is looked at as well before an answer is
+/// called exact: what a budget leaves no time for. So codes change what a budget finds a little, and no exact
+/// answer.
+///
 /// The index grows and shrinks with the caller's set: cells that have become too full split. s and low are
 /// those of the points of the build: of others, far outside, the bytes say little, and they are measured.
 /// descriptor_file.hpp saves it.
@@ -33,6 +39,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <numeric>
 #include <optional>
@@ -52,12 +59,20 @@
 
 namespace cairn { inline namespace CAIRN_ABI {
 
+/// Whether points have product codes of four bits, beside their bytes.
+enum class DescriptorCodes {
+  automatic,  ///< where they save time: large sets of many coordinates
+  off,
+  on
+};
+
 struct DescriptorIndexOptions {
   /// Mean number of points in a cell, up to a factor of 1.5. 0: sqrt(n) / 6, but at least 32, where scanning
   /// the means costs about as much as scanning the cells.
   std::size_t points_in_cell = 0;
   unsigned rounds = 5;   ///< of moving the cells to their means; 0 leaves the kd-tree's
   unsigned threads = 1;  ///< of the build; the index is the same for any number (0 counts as 1)
+  DescriptorCodes codes = DescriptorCodes::automatic;
 };
 
 namespace detail {
@@ -97,6 +112,8 @@ public:
   [[nodiscard]] std::size_t dimension() const noexcept { return low_.size(); }
   [[nodiscard]] L2 metric() const noexcept { return {}; }
   [[nodiscard]] std::size_t cells() const noexcept { return cells_.size(); }
+  /// Whether a search looks at codes first.
+  [[nodiscard]] bool coded() const noexcept { return cells_.coded(); }
   /// True where every coordinate is a byte's value exactly, so that distances of bytes are distances.
   [[nodiscard]] bool bytes_are_exact() const noexcept { return error_ == 0; }
   /// Memory held, the caller's points not included.
@@ -219,11 +236,20 @@ public:
       cells_.reset();
       Offer<C> offer(index, row_.data(), error, collector);
       Work done{.nodes = means.blocks()};
-      const bool all = scan_cells(index, offer, budget.leaves, done);
+      pending_.clear();
+      doubts_.clear();
+      looked_at_ = 0;
+      if (index.coded()) index.cells_.codebook().make_tables(codes_.data(), tables_);
+      bool all = scan_cells(index, offer, budget.leaves, done);
+      measure_pending(index, offer);
+      if (all) settle_doubts(index, offer);
       if (work != nullptr) *work += done;
       if (measured != nullptr) *measured += offer.measured();
       return all;
     }
+
+    /// Points of the last search whose bytes were looked at, where points have codes.
+    [[nodiscard]] std::size_t looked_at() const noexcept { return looked_at_; }
 
   private:
     template <class O>
@@ -232,15 +258,16 @@ public:
       while (cell.place != detail::SmallestFirst::none) {
         if (left == 0) return false;
         const auto after = cells_.next();
-        if (after.place != detail::SmallestFirst::none)
-          index.cells_.members().prefetch(index.cells_.first_block(after.place),
-                                          index.cells_.blocks_of(after.place));
+        if (after.place != detail::SmallestFirst::none) prefetch(index, after.place);
         if (offer.may_hold_nearer(std::sqrt(static_cast<float>(cell.key)) -
                                   index.cells_.radius(cell.place))) {
           const std::size_t begin = index.cells_.first_block(cell.place);
           const std::size_t blocks = index.cells_.blocks_of(cell.place);
           const std::size_t scanned = std::min(left, blocks);
-          scan(index, begin, scanned, offer);
+          if (index.coded())
+            scan_codes(index, cell, scanned, offer);
+          else
+            scan(index, begin, scanned, offer);
           done.leaves += scanned;
           done.distances += scanned * detail::block_size;
           left -= scanned;
@@ -253,7 +280,6 @@ public:
 
     template <class O>
     void scan(const DescriptorIndex& index, std::size_t block, std::size_t count, O& offer) const {
-      constexpr std::size_t at_once = 8;
       std::int32_t distances[at_once * detail::block_size];
       for (const std::size_t end = block + count; block < end;) {
         const std::size_t now = std::min(at_once, end - block);
@@ -263,10 +289,121 @@ public:
       }
     }
 
+    static void prefetch(const DescriptorIndex& index, std::size_t cell) noexcept {
+      const std::size_t first = index.cells_.first_block(cell), count = index.cells_.blocks_of(cell);
+      if (index.coded()) {
+        index.cells_.codes().prefetch(first, count);
+      } else {
+        index.cells_.members().prefetch(first, count);
+      }
+    }
+
+    static constexpr std::size_t at_once = 8;  ///< blocks whose estimates are made together
+
+    /// Asks for the bytes of likely points, and looks at those of the blocks before: they have come
+    /// meanwhile. Points that are possible but not likely are written down.
+    template <class O>
+    void scan_codes(const DescriptorIndex& index, detail::SmallestFirst::Item cell, std::size_t count,
+                    O& offer) {
+      const std::size_t points = index.cells_.members_of(cell.place).size();
+      std::size_t block = index.cells_.first_block(cell.place);
+      const std::size_t end_of_points = block * detail::block_size + points;
+      float estimates[at_once * detail::block_size];
+      detail::CodeVerdict verdicts[at_once];
+      for (const std::size_t end = block + count; block < end;) {
+        const std::size_t now = std::min(at_once, end - block);
+        index.cells_.codes().estimates(block, now, tables_, scale_of(index, cell.key), estimates);
+        for (std::size_t place = end_of_points; place < (block + now) * detail::block_size; ++place)
+          estimates[place - block * detail::block_size] = std::numeric_limits<float>::infinity();
+        measure_pending(index, offer);
+        if (offer.unlimited()) find_limit(index, block, now, estimates, offer);
+        index.cells_.codes().verdicts(block, now, estimates, limits_of(index, cell.key, offer), verdicts);
+        for (std::size_t i = 0; i < now; ++i, ++block) {
+          ask_for(index, block, verdicts[i].likely);
+          if (const unsigned doubtful = verdicts[i].possible & ~verdicts[i].likely)
+            doubts_.push_back({static_cast<std::uint32_t>(block), doubtful, cell.key});
+        }
+      }
+    }
+
+    /// Without a limit everyone is likely: the points with the smallest estimates give one.
+    template <class O>
+    void find_limit(const DescriptorIndex& index, std::size_t block, std::size_t count, float* estimates,
+                    O& offer) {
+      constexpr float done = std::numeric_limits<float>::infinity();
+      while (offer.unlimited()) {
+        const float* least = std::min_element(estimates, estimates + count * detail::block_size);
+        if (*least == done) return;
+        const auto place = static_cast<std::size_t>(least - estimates);
+        estimates[place] = done;
+        pending_.push_back(static_cast<std::uint32_t>(block * detail::block_size + place));
+        measure_pending(index, offer);
+      }
+    }
+
+    /// Measures whoever is still possible of those that were not likely.
+    template <class O>
+    void settle_doubts(const DescriptorIndex& index, O& offer) {
+      float estimates[detail::block_size];
+      detail::CodeVerdict verdict{};
+      for (const Doubt& doubt : doubts_) {
+        index.cells_.codes().estimates(doubt.block, 1, tables_, scale_of(index, doubt.key), estimates);
+        index.cells_.codes().verdicts(doubt.block, 1, estimates, limits_of(index, doubt.key, offer),
+                                      &verdict);
+        if (pending_.size() >= at_once) measure_pending(index, offer);
+        ask_for(index, doubt.block, verdict.possible & doubt.lanes);
+      }
+      measure_pending(index, offer);
+    }
+
+    [[nodiscard]] detail::CodeScale scale_of(const DescriptorIndex& index, std::int32_t key) const noexcept {
+      return index.cells_.codes().scale(static_cast<float>(key), tables_);
+    }
+    template <class O>
+    [[nodiscard]] detail::CodeLimits limits_of(const DescriptorIndex& index, std::int32_t key,
+                                               const O& offer) const noexcept {
+      const float proven = 2 * std::sqrt(static_cast<float>(key)) * 1.00001F + 0.001F;
+      const float likely = std::clamp(likely_spreads * index.cells_.spread(), 0.001F, 1.0F) * proven;
+      return {likely, proven, index.cells_.codes().rounding(static_cast<float>(key), tables_),
+              static_cast<float>(offer.below()) * 1.000001F};
+    }
+
+    void ask_for(const DescriptorIndex& index, std::size_t block, unsigned lanes) {
+      for (; lanes != 0; lanes &= lanes - 1) {
+        const std::size_t place =
+            block * detail::block_size + static_cast<std::size_t>(std::countr_zero(lanes));
+        index.cells_.rows().prefetch(place);
+        pending_.push_back(static_cast<std::uint32_t>(place));
+      }
+    }
+
+    template <class O>
+    void measure_pending(const DescriptorIndex& index, O& offer) {
+      if (pending_.empty()) return;
+      looked_at_ += pending_.size();
+      distances_.resize(pending_.size());
+      index.cells_.rows().distances(pending_.data(), pending_.size(), query_, distances_.data());
+      for (std::size_t i = 0; i < pending_.size(); ++i)
+        if (distances_[i] < offer.below()) offer.one(distances_[i], index.cells_.id_of(pending_[i]));
+      pending_.clear();
+    }
+
+    /// Points of a block that are possible but were not likely.
+    struct Doubt {
+      std::uint32_t block;
+      std::uint32_t lanes;
+      std::int32_t key;  ///< squared distance from the cell's mean
+    };
+
     std::vector<float> row_;
     std::vector<std::uint8_t> codes_;
     detail::ByteQuery query_;
     detail::SmallestFirst cells_;
+    detail::CodeTables tables_;
+    std::vector<std::uint32_t> pending_;  ///< places
+    std::vector<std::int32_t> distances_;
+    std::vector<Doubt> doubts_;
+    std::size_t looked_at_ = 0;
   };
 
 private:
@@ -292,6 +429,14 @@ private:
 
     /// Whether a point that is so far away, in bytes, may be below the limit.
     [[nodiscard]] bool may_hold_nearer(float bytes) const noexcept { return bytes < reach_; }
+
+    /// In bytes: only who is nearer, squared, may be below the limit.
+    [[nodiscard]] std::int32_t below() const noexcept { return below_; }
+    [[nodiscard]] bool unlimited() const noexcept { return reach_ == std::numeric_limits<float>::infinity(); }
+
+    void one(std::int32_t distance, PointId id) {
+      if (distance < below_ && id != no_point) point(distance, id);
+    }
 
     void block(const std::int32_t* distances, const PointId* ids) {
       unsigned mask = 0;
@@ -382,16 +527,46 @@ private:
   float encode(const float* row, std::uint8_t* codes) const noexcept {
     float sum = 0;
     bool exact = true;
-    for (std::size_t a = 0; a < dimension(); ++a) {
-      // A query may be far away: then it is moved nearer to all bytes alike.
-      const float scaled = std::clamp((row[a] - low_[a]) / unit_, -1e15F, 1e15F);
-      const float code = std::clamp(std::floor(scaled + 0.5F), 0.0F, 255.0F);
-      codes[a] = static_cast<std::uint8_t>(code);
-      sum += (scaled - code) * (scaled - code);
-      // A difference may be rounded to a byte's value, and the point not be there.
-      exact = exact && scaled == code && low_[a] + code * unit_ == row[a];
-    }
+    detail::with_widest_lanes([&]() CAIRN_INLINED {
+      detail::Block<float> sums{};
+      detail::Block<std::int32_t> misses{};
+      std::size_t axis = 0;
+      for (; axis + detail::block_size <= dimension(); axis += detail::block_size)
+        encode_block(row + axis, low_.data() + axis, codes + axis, sums, misses);
+      if (const std::size_t left = dimension() - axis; left > 0) {
+        float numbers[detail::block_size] = {}, low[detail::block_size] = {};
+        std::uint8_t bytes[detail::block_size];
+        std::copy_n(row + axis, left, numbers);
+        std::copy_n(low_.data() + axis, left, low);
+        encode_block(numbers, low, bytes, sums, misses);
+        std::copy_n(bytes, left, codes + axis);
+      }
+      for (std::size_t i = 0; i < detail::block_size; ++i) sum += sums[i];
+      exact = detail::smallest<std::int32_t>(misses) == 0;
+    });
     return exact ? 0 : std::sqrt(sum) * 1.001F + 1e-3F;
+  }
+  /// Sixteen coordinates; a miss is -1.
+  [[gnu::always_inline]] void encode_block(const float* row, const float* low, std::uint8_t* codes,
+                                           detail::Block<float>& sums,
+                                           detail::Block<std::int32_t>& misses) const noexcept {
+    detail::Block<float> numbers, from;
+    detail::load_block<float>(row, numbers);
+    detail::load_block<float>(low, from);
+    // A query may be far away: then it is moved nearer to all bytes alike.
+    const detail::Block<float> zero{}, far = zero + 1e15F, top = zero + 255.0F;
+    detail::Block<float> scaled = (numbers - from) / unit_;
+    scaled = scaled < -far ? -far : scaled;
+    scaled = scaled > far ? far : scaled;
+    detail::Block<float> inside = scaled < zero ? zero : scaled;
+    inside = inside > top ? top : inside;
+    const auto whole = __builtin_convertvector(inside + 0.5F, detail::Block<std::int32_t>);
+    const auto code = __builtin_convertvector(whole, detail::Block<float>);
+    const auto bytes = __builtin_convertvector(whole, detail::Block<std::uint8_t>);
+    std::memcpy(codes, &bytes, sizeof(bytes));
+    sums += (scaled - code) * (scaled - code);
+    // A difference may be rounded to a byte's value, and the point not be there.
+    misses |= (scaled != code) | (from + code * unit_ != numbers);
   }
 
   void check_dimension() const {
@@ -404,7 +579,8 @@ private:
     size_ = ids.size();
     const std::vector<std::uint8_t> codes = encode(rows);
     detail::KMeansBuilder builder(codes, dimension(), options_.threads);
-    cells_ = detail::ByteCells(dimension(), codes, ids, builder.build(depth_for(in_cell()), options_.rounds));
+    cells_ = detail::ByteCells(dimension(), codes, ids, builder.build(depth_for(in_cell()), options_.rounds),
+                               codes_pay(size_), options_.threads);
   }
 
   /// All or, where memory ends, none.
@@ -413,6 +589,7 @@ private:
     std::vector<std::uint8_t> codes(rows.size());
     float error = error_;
     for (std::size_t i = 0; i < rows.size(); i += dim) error = std::max(error, encode(&rows[i], &codes[i]));
+    if (!coded() && codes_pay(size_ + ids.size())) cells_.take_codes(options_.threads);
     cells_.number_places(ids.back());
     for (const PointId id : ids)
       if (cells_.contains(id))
@@ -434,6 +611,12 @@ private:
     error_ = error;
   }
 
+  /// Whether a set of so many points is searched faster by codes: below, bytes are in the cache anyhow.
+  [[nodiscard]] bool codes_pay(std::size_t count) const noexcept {
+    if (options_.codes != DescriptorCodes::automatic) return options_.codes == DescriptorCodes::on;
+    return dimension() >= 96 && count * dimension() >= std::size_t{1} << 22U;
+  }
+
   [[nodiscard]] std::size_t in_cell() const noexcept {
     if (options_.points_in_cell > 0) return options_.points_in_cell;
     return std::max<std::size_t>(2 * detail::block_size,
@@ -447,6 +630,10 @@ private:
       L2::accumulate(sum, query[a] - detail::coordinate<float>(point, a), a);
     return sum;
   }
+
+  /// How many spreads an estimate may err to the one side before a point that is near is taken for far: 3.5
+  /// leave out one of some hundreds.
+  static constexpr float likely_spreads = 3.5F;
 
   const Points* points_;
   DescriptorIndexOptions options_;

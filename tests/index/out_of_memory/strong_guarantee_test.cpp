@@ -215,30 +215,33 @@ TEST_SUITE("out_of_memory") {
     std::vector<Point> points = random_points(90, random);
     const auto queries = random_points(6, random);
     using Cells = cairn::DescriptorIndex<std::vector<Point>>;
-    const Cells small(points, {.points_in_cell = 6});
     const auto more = random_points(60, random);
-    points.insert(points.end(), more.begin(), more.end());
-    const auto before = answers(small, queries);
-    Cells grown = small;
-    grown.insert(90, 60);
-    const auto after = answers(grown, queries);
-    REQUIRE(grown.cells() >= small.cells() + 2);
-    long allowed = 0;
-    for (bool done = false; !done; ++allowed) {
-      CAPTURE(allowed);
-      Cells index = small;
-      done = enough(allowed, [&] { index.insert(90, 60); });
-      REQUIRE(answers(index, queries) == (done ? after : before));
-      index.erase(3);
-      if (!done) index.insert(90, 60);
-      index.insert(3);
-      REQUIRE(answers(index, queries) == after);
-    }
-    CHECK(allowed > 30);
-    for (long few = 0; few < 2; ++few) {
-      Cells index = small;
-      REQUIRE_FALSE(enough(few, [&] { index.erase(5); }));
-      REQUIRE(answers(index, queries) == before);
+    for (const auto codes : {cairn::DescriptorCodes::off, cairn::DescriptorCodes::on}) {
+      points.resize(90);
+      const Cells small(points, {.points_in_cell = 6, .codes = codes});
+      points.insert(points.end(), more.begin(), more.end());
+      const auto before = answers(small, queries);
+      Cells grown = small;
+      grown.insert(90, 60);
+      const auto after = answers(grown, queries);
+      REQUIRE(grown.cells() >= small.cells() + 2);
+      long allowed = 0;
+      for (bool done = false; !done; ++allowed) {
+        CAPTURE(allowed);
+        Cells index = small;
+        done = enough(allowed, [&] { index.insert(90, 60); });
+        REQUIRE(answers(index, queries) == (done ? after : before));
+        index.erase(3);
+        if (!done) index.insert(90, 60);
+        index.insert(3);
+        REQUIRE(answers(index, queries) == after);
+      }
+      CHECK(allowed > 30);
+      for (long few = 0; few < 2; ++few) {
+        Cells index = small;
+        REQUIRE_FALSE(enough(few, [&] { index.erase(5); }));
+        REQUIRE(answers(index, queries) == before);
+      }
     }
   }
 

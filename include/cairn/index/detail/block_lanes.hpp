@@ -83,7 +83,7 @@ template <class Real>
   return mask;
 }
 
-/// Smallest of sixteen integers.
+/// Smallest of sixteen numbers, none of them NaN.
 template <class Int>
 [[gnu::always_inline]] inline Int smallest(const Block<Int>& numbers) noexcept {
   using Eight __attribute__((vector_size(8 * sizeof(Int)))) = Int;

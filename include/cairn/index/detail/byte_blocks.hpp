@@ -42,12 +42,16 @@ public:
     const std::size_t padded = (dim + lane_axes - 1) / lane_axes * lane_axes;
     codes_.assign(padded, 0);
     shifted_.assign(padded, 0);
-    square_ = 0;
-    for (std::size_t a = 0; a < dim; ++a) {
-      codes_[a] = codes[a];
-      shifted_[a] = static_cast<std::int8_t>(codes[a] - 128);
-      square_ += codes[a] * codes[a];
-    }
+    std::memcpy(codes_.data(), codes, dim);
+    std::int32_t square = 0;
+    std::int8_t* shifted = shifted_.data();
+    with_widest_lanes([&]() CAIRN_INLINED {
+      for (std::size_t a = 0; a < dim; ++a) {
+        shifted[a] = static_cast<std::int8_t>(codes[a] - 128);
+        square += codes[a] * codes[a];
+      }
+    });
+    square_ = square;
   }
 
   [[nodiscard]] const std::uint8_t* codes() const noexcept { return codes_.data(); }
@@ -263,6 +267,50 @@ private:
   AlignedVector<std::int32_t> constants_;
 };
 
+/// Points of bytes, each on cache lines of its own: for the few whose distance is asked for one by one.
+class ByteRows {
+public:
+  ByteRows() = default;
+  ByteRows(std::size_t dim, std::size_t count)
+      : dim_(dim), data_(room_for(count, stride(), "DescriptorIndex")) {}
+
+  [[nodiscard]] std::size_t bytes() const noexcept { return data_.capacity(); }
+  void set(std::size_t place, const std::uint8_t* row) noexcept {
+    std::memcpy(data_.data() + place * stride(), row, dim_);
+  }
+  [[nodiscard]] const std::uint8_t* row(std::size_t place) const noexcept {
+    return data_.data() + place * stride();
+  }
+  void reserve(std::size_t count) { reserve_ahead(data_, room_for(count, stride(), "DescriptorIndex")); }
+  void resize(std::size_t count) { data_.resize(count * stride()); }
+  void prefetch(std::size_t place) const noexcept {
+    for (std::size_t byte = 0; byte < stride(); byte += 64) __builtin_prefetch(row(place) + byte);
+  }
+
+  /// distances[i] = that of row places[i].
+  void distances(const std::uint32_t* places, std::size_t count, const ByteQuery& query,
+                 std::int32_t* distances) const noexcept {
+    with_widest_lanes([&]() CAIRN_INLINED {
+      for (std::size_t i = 0; i < count; ++i) {
+        const std::uint8_t* here = row(places[i]);
+        const std::uint8_t* there = query.codes();
+        std::int32_t sum = 0;
+        for (std::size_t a = 0; a < dim_; ++a) {
+          const int difference = here[a] - there[a];
+          sum += difference * difference;
+        }
+        distances[i] = sum;
+      }
+    });
+  }
+
+private:
+  [[nodiscard]] std::size_t stride() const noexcept { return (dim_ + 63) / 64 * 64; }
+
+  std::size_t dim_ = 0;
+  AlignedVector<std::uint8_t> data_;
+};
+
 /// Whole numbers in ascending order, one at a time, as many as are asked for; equal ones by their place.
 class SmallestFirst {
 public:
@@ -275,6 +323,8 @@ public:
     const std::size_t blocks = (count + block_size - 1) / block_size;
     keys_.resize(blocks * block_size);
     minima_.assign((blocks + block_size - 1) / block_size * block_size, taken);
+    taken_.resize(keys_.size());
+    sorted_.resize(keys_.size());
     count_ = count;
   }
   [[nodiscard]] std::int32_t* keys() noexcept { return keys_.data(); }
@@ -284,55 +334,98 @@ public:
     with_widest_lanes([&]() CAIRN_INLINED {
       for (std::size_t b = 0; b < keys_.size() / block_size; ++b) minima_[b] = smallest_of(keys_, b);
     });
+    sorted_count_ = 0;
+    given_ = 0;
   }
 
   struct Item {
     std::size_t place;
     std::int32_t key;
   };
-  /// The next; place is none where all were given. O(count / 256).
+  /// The next; place is none where all were given. O(count / 256) and the share of a sort.
   [[nodiscard]] Item next() noexcept {
-    Item item{none, taken};
-    with_widest_lanes([&]() CAIRN_INLINED {
-      const std::size_t groups = minima_.size() / block_size;
-      Block<std::int32_t> low = Block<std::int32_t>{} + taken;
-      for (std::size_t g = 0; g < groups; ++g) {
-        Block<std::int32_t> here;
-        load_block<std::int32_t>(minima_.data() + g * block_size, here);
-        low = here < low ? here : low;
-      }
-      item.key = smallest<std::int32_t>(low);
-      if (item.key == taken) return;
-      const std::size_t block = place_of(minima_, item.key, 0);
-      item.place = place_of(keys_, item.key, block);
-      keys_[item.place] = taken;
-      minima_[block] = smallest_of(keys_, block);
-    });
-    return item;
+    if (given_ == sorted_count_) sort_some();
+    if (given_ == sorted_count_) return {none, taken};
+    return sorted_[given_++];
   }
 
 private:
   using Numbers = AlignedVector<std::int32_t>;
+  static constexpr std::size_t some = 10;
 
   [[gnu::always_inline]] static std::int32_t smallest_of(const Numbers& numbers, std::size_t block) noexcept {
     Block<std::int32_t> here;
     load_block<std::int32_t>(numbers.data() + block * block_size, here);
     return smallest<std::int32_t>(here);
   }
-  /// First place from a block on that holds a number that is there.
-  [[gnu::always_inline]] static std::size_t place_of(const Numbers& numbers, std::int32_t number,
-                                                     std::size_t block) noexcept {
-    for (;; ++block) {
-      Block<std::int32_t> here;
-      load_block<std::int32_t>(numbers.data() + block * block_size, here);
-      if (const unsigned mask = mask_below<std::int32_t>(here, number + 1))
-        return block * block_size + static_cast<std::size_t>(std::countr_zero(mask));
+
+  /// Takes out all numbers up to one that at least `some` do not exceed, if so many are left: of the minima
+  /// of sixteen parts the one of that rank. A few dozen as a rule.
+  void sort_some() noexcept {
+    sorted_count_ = 0;
+    given_ = 0;
+    with_widest_lanes([&]() CAIRN_INLINED {
+      Block<std::int32_t> low = Block<std::int32_t>{} + taken;
+      for (std::size_t g = 0; g < minima_.size(); g += block_size) {
+        Block<std::int32_t> here;
+        load_block<std::int32_t>(minima_.data() + g, here);
+        low = here < low ? here : low;
+      }
+      Block<std::int32_t> below{};  // how many of the parts are below each
+      for (std::size_t i = 0; i < block_size; ++i) below -= Block<std::int32_t>{} + low[i] < low;
+      const Block<std::int32_t> candidates =
+          below < Block<std::int32_t>{} + static_cast<std::int32_t>(some) ? low : Block<std::int32_t>{} - 1;
+      const std::int32_t most = std::min(-smallest<std::int32_t>(-candidates), taken - 1);
+      for (std::size_t g = 0; g < minima_.size(); g += block_size) {
+        Block<std::int32_t> here;
+        load_block<std::int32_t>(minima_.data() + g, here);
+        for (unsigned mask = mask_below<std::int32_t>(here, most + 1); mask != 0; mask &= mask - 1)
+          take(g + static_cast<std::size_t>(std::countr_zero(mask)), most);
+      }
+      sort_taken();
+    });
+  }
+  [[gnu::always_inline]] void take(std::size_t block, std::int32_t most) noexcept {
+    Block<std::int32_t> here;
+    load_block<std::int32_t>(keys_.data() + block * block_size, here);
+    for (unsigned mask = mask_below<std::int32_t>(here, most + 1); mask != 0; mask &= mask - 1) {
+      const std::size_t place = block * block_size + static_cast<std::size_t>(std::countr_zero(mask));
+      taken_[sorted_count_++] = {place, keys_[place]};
+      keys_[place] = taken;
+    }
+    minima_[block] = smallest_of(keys_, block);
+  }
+  /// By counting for each who comes before it, sixteen at a time and without a branch: they are few.
+  [[gnu::always_inline]] void sort_taken() noexcept {
+    if (sorted_count_ > 16 * block_size) {
+      std::copy_n(taken_.begin(), sorted_count_, sorted_.begin());
+      const auto before = [](const Item& a, const Item& b) {
+        return a.key != b.key ? a.key < b.key : a.place < b.place;
+      };
+      std::sort(sorted_.begin(), sorted_.begin() + static_cast<std::ptrdiff_t>(sorted_count_), before);
+      return;
+    }
+    for (std::size_t begin = 0; begin < sorted_count_; begin += block_size) {
+      const std::size_t size = std::min(block_size, sorted_count_ - begin);
+      Block<std::int32_t> keys{}, numbers{}, ranks{};
+      for (std::size_t i = 0; i < size; ++i) keys[i] = taken_[begin + i].key;
+      for (std::size_t i = 0; i < size; ++i) numbers[i] = static_cast<std::int32_t>(begin + i);
+      for (std::size_t j = 0; j < sorted_count_; ++j) {
+        // Of equals the one that was taken out first, whose place is lower.
+        const Block<std::int32_t> later = numbers > Block<std::int32_t>{} + static_cast<std::int32_t>(j);
+        ranks -= Block<std::int32_t>{} + taken_[j].key < keys - later;
+      }
+      for (std::size_t i = 0; i < size; ++i) sorted_[static_cast<std::size_t>(ranks[i])] = taken_[begin + i];
     }
   }
 
   std::size_t count_ = 0;
   Numbers keys_;
-  Numbers minima_;
+  Numbers minima_;            ///< of sixteen keys each
+  std::vector<Item> taken_;   ///< by place
+  std::vector<Item> sorted_;  ///< the same by key
+  std::size_t sorted_count_ = 0;
+  std::size_t given_ = 0;  ///< of them
 };
 
 }}}  // namespace cairn::CAIRN_ABI::detail
