@@ -99,7 +99,7 @@ Results run(const Drive& drive, const RunOptions& options,
                                         .seed = options.seed,
                                         .threads = options.threads};
   const cairn::FromLandmarks proposal{
-      .weight = cairn::FromLandmarks::Weight::evidence, .associations = 2, .hypotheses = 20};
+      .weight = cairn::FromLandmarks::Weight::evidence, .associations = 2, .hypotheses = 10};
   std::vector<SE3> odometry;
   for (const Frame& frame : drive.frames) {
     const auto motion = [&](const SE3& x, std::size_t) {

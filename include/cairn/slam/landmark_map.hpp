@@ -281,9 +281,9 @@ public:
     return std::log(not_a_landmark == new_landmark ? options().new_density : options().clutter_density);
   }
 
-  /// Whether a sighting lies inside the gate of one without a name about this landmark, which is there.
-  [[nodiscard]] bool agrees(const Gaussian<Pose>& x, const Measurement& z, std::uint32_t number) const {
-    return candidate(x, z, number, common_->gate).has_value();
+  /// The squared Mahalanobis distance up to which a sighting may be of a landmark.
+  [[nodiscard]] double gate_of(const Sighting& sighting) const noexcept {
+    return sighting.identity ? common_->gate_of_named : common_->gate;
   }
 
   /// Takes the sightings in: updates, new landmarks, and the odds of what was not seen though in view.
@@ -385,11 +385,12 @@ struct FromLandmarks {
   /// How often it is chosen which landmarks the sightings are of: with the pose as the motion leaves it, then
   /// again with the pose as that choice makes it, which tells neighbours apart that the motion cannot.
   int associations = 1;
-  /// Above 0: the motion leaves more room than neighbours are apart. So many candidates of sightings, those
-  /// of sightings that have several first, are taken in alone; each decides what the other sightings are of,
+  /// Above 0: the motion leaves more room than neighbours are apart. Candidates, those of sightings that have
+  /// several first, are taken in alone, one after the other; each decides what the other sightings are of,
   /// and the decision under which all are likeliest together stays (after J. Civera, O. Grasa, A. Davison,
-  /// J. Montiel, "1-point RANSAC for EKF filtering", IROS 2009, who count). With Pick::drawn the probability
-  /// of the choice is then no longer what is divided by.
+  /// J. Montiel, "1-point RANSAC for EKF filtering", IROS 2009, who count). It ends after so many in a row
+  /// that led to nothing better. With Pick::drawn the probability of the choice is then no longer what is
+  /// divided by.
   int hypotheses = 0;
 
   /// Throws Error where the motion's covariance is singular: then use FromMotion, or say how the wheels slip.
@@ -467,7 +468,6 @@ private:
       return std::tie(a.is_alone, a.log_volume, a.sighting, a.landmark) <
              std::tie(b.is_alone, b.log_volume, b.sighting, b.landmark);
     });
-    if (all.size() > static_cast<std::size_t>(hypotheses)) all.erase(all.begin() + hypotheses, all.end());
     return all;
   }
 
@@ -481,7 +481,9 @@ private:
     Gaussian<typename L::State> q = motion;
     double most = take_in(q, map, z, best.choice);
     std::vector<Association> tried{best.choice};
+    int in_vain = 0;
     for (const Beginning& each : beginnings(map, candidates, motion.mean, z)) {
+      if (++in_vain > hypotheses) break;
       q = motion;
       const auto& model = detail::model_of(map.sensor(), z[each.sighting].z);
       const auto in = Extended{.iterations = iterations}.update(
@@ -496,12 +498,13 @@ private:
       if (!(log_evidence > most)) continue;
       most = log_evidence;
       best = std::move(chosen);
+      in_vain = 0;
     }
     return best;
   }
 
-  /// What lies outside its gate about the pose as the surer ones leave it is called clutter. Returns the sum
-  /// of the innovations' log densities.
+  /// What lies outside its gate about the pose as the surer ones leave it is called clutter, but where the
+  /// choice was drawn. Returns the sum of the innovations' log densities.
   template <LandmarkSensor L, class F>
   double take_in(Gaussian<typename L::State>& q, const LandmarkMap<L, F>& map,
                  const typename LandmarkMap<L, F>::Observation& z, Association& n) const {
@@ -520,18 +523,18 @@ private:
           {k, n[k], Cholesky<dof<typename Model::Measurement>>(sensor.noise(q.mean)).log_determinant()});
     }
     sort_surest_first(known);
-    const Extended filter{.iterations = iterations};
     for (const Known& each : known) {
+      const Extended filter{.gate = map.options().pick == Pick::likeliest
+                                        ? map.gate_of(z[each.sighting])
+                                        : std::numeric_limits<double>::infinity(),
+                            .iterations = iterations};
       const auto& landmark = map.find(each.landmark)->belief;
       const auto& model = detail::model_of(map.sensor(), z[each.sighting].z);
-      if (!z[each.sighting].identity && !map.agrees(q, z[each.sighting].z, each.landmark)) {
-        n[each.sighting] = no_landmark;
-        log_evidence += map.log_density_of(no_landmark);
-        continue;
-      }
       const auto in = filter.update(q, detail::SensorOfPose<Model>{model, landmark},
                                     detail::measured<L>(model, z[each.sighting].z));
-      if (in.accepted()) log_evidence += in.log_likelihood();
+      if (in.status == Status::gated) n[each.sighting] = no_landmark;
+      if (in.accepted() || in.status == Status::gated)
+        log_evidence += in.accepted() ? in.log_likelihood() : map.log_density_of(no_landmark);
     }
     return log_evidence;
   }

@@ -1,0 +1,90 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+// Drives that are rendered, so that the lines and the path are known.
+#include "run.hpp"
+
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include <doctest/doctest.h>
+
+#include <cairn/core/cholesky.hpp>
+#include <cairn/core/statistics.hpp>
+#include <cairn/geometry/line.hpp>
+
+#include "drive.hpp"
+#include "support/random.hpp"
+
+namespace line_run_test {
+namespace {
+
+using namespace line_slam;
+
+/// Squared error of a line over its covariance; nothing where the true one is not before the line's anchor.
+std::optional<double> nees(const cairn::Gaussian<MappedLine>& belief, const Edge& edge) {
+  const auto truth = belief.mean.line.about(cairn::Line::through(edge.from, edge.to));
+  if (!truth) return std::nullopt;
+  const cairn::Cholesky<4> root(belief.covariance);
+  REQUIRE(root.good());
+  return root.whiten(cairn::local(belief.mean.line, *truth)).squaredNorm();
+}
+
+}  // namespace
+
+TEST_SUITE("line_slam/run") {
+  TEST_CASE("line_slam: NEES of 500 lines that are mapped with the true poses is in its band") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    double sum = 0;
+    std::size_t count = 0;
+    for (std::uint64_t campus = 0; count < 500; ++campus) {
+      DriveOptions options{.seed = seed * 100 + campus, .metres = 120};
+      options.detector.made_up = 0;
+      options.detector.broken = 0;  // pieces that are joined again err less than a segment, as they should
+      const Drive drive = simulated_drive(options);
+      LineSensor sensor;
+      sensor.rig = std::make_shared<const Rig>(drive.rig);
+      sensor.sigma = options.detector.sigma;
+      cairn::LandmarkOptions landmarks = RunOptions{}.landmarks;
+      landmarks.gate_of_named = landmarks.gate;  // as the program, which knows no names
+      Map map(sensor, landmarks);
+      for (std::size_t k = 0; k < drive.frames.size(); ++k) {
+        Map::Observation seen;
+        for (const auto& sighting : drive.frames[k].seen)  // as many as are told apart without doubt
+          if (sighting.z.edge != no_edge) seen.push_back({sighting.z, sighting.z.edge});
+        cairn::Random none(1);
+        map.insert(drive.truth[k], seen, map.choose(drive.truth[k], seen, none).choice);
+      }
+      map.for_each([&](std::uint32_t edge, const cairn::MappedLandmark<MappedLine>& landmark) {
+        if (landmark.sightings < 2) return;  // what one sighting says is in tests/geometry
+        if (const auto e = nees(landmark.belief, drive.campus.edges()[edge])) {
+          sum += *e;
+          ++count;
+        }
+      });
+    }
+    MESSAGE(count, " lines, NEES ", sum / static_cast<double>(count));
+    CHECK(cairn::chi_square_mean_band(4, static_cast<double>(count), 0.999)
+              .contains(sum / static_cast<double>(count)));
+  }
+
+  TEST_CASE("line_slam: particles map a side of the campus nearly as well as the true poses do") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    const Drive drive = simulated_drive({.seed = seed, .metres = 60});
+    const Results r = run(drive, {.particles = 30, .seed = seed});
+    MESSAGE("rms ", r.exact.rms, " ", r.slam.rms, " ", r.odometry.rms, ", path ", r.slam.path_rms, " ",
+            r.odometry.path_rms);
+    CHECK(r.slam.rms < 2 * r.exact.rms + 0.1);
+    CHECK(r.slam.path_rms < 0.3);
+    CHECK(r.slam.path_rms < 0.5 * r.odometry.path_rms);
+    CHECK(r.slam.edges > r.exact.edges * 9 / 10);
+    // A particle's map is judged by what it began with: the same line twice would be more lines than edges.
+    CHECK(r.slam.lines.size() < r.exact.lines.size() * 12 / 10);
+  }
+}
+
+}  // namespace line_run_test
