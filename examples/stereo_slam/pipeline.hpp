@@ -78,7 +78,9 @@ struct PipelineOptions {
   GuidedMatchingOptions second_look;
   std::size_t min_inliers = 10;          ///< fewer: the frame is lost
   std::size_t relocating_inliers = 25;   ///< fewer: a camera that is lost stays so
-  double max_depth_over_baseline = 150;  ///< farther points are too vague to keep
+  /// Farther points are too vague to keep. Where noise decides what is kept, those that it puts too near are:
+  /// the limit lies where a landmark weighs little.
+  double max_depth_over_baseline = 250;
   /// A frame becomes a keyframe when the share of its points that the map knows falls below this part of what
   /// it was at best since the last one.
   double keyframe_share = 0.8;
