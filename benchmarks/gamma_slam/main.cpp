@@ -36,7 +36,7 @@ Runs runs_of(Cells cells, std::uint64_t seeds) {
     runs.odometry.push_back(r.odometry_error());
     runs.error.push_back(r.filter_error());
     runs.share.push_back(r.filter_error() / r.odometry_error());
-    runs.covered.push_back(100 * r.coverage.share());
+    runs.covered.push_back(100 * r.coverage->share());
     runs.milliseconds.push_back(1e3 * r.seconds / static_cast<double>(r.scans));
     std::cerr << "seed " << seed << ": visual odometry " << runs.odometry.back() << " m, filter "
               << runs.error.back() << " m, covered " << runs.covered.back() << " %\n";

@@ -170,6 +170,7 @@ void put_motion(TerrainScan& scan, const SE3& T_before_now, const Matrix<6>& cov
 Drive simulated_drive(const DriveOptions& options) {
   Random random(options.seed, 23);
   Drive drive;
+  const Terrain& terrain = drive.terrain.emplace(std::uint64_t{5});
   const double disparity_error = options.rig_sigma * random.normal();
   const double level_sigma = options.level_sigma * std::numbers::pi / 180;
   const SE3 T_vehicle_camera = mounted();
@@ -180,7 +181,7 @@ Drive simulated_drive(const DriveOptions& options) {
   for (std::size_t i = 0; i < count; ++i) {
     const double along = options.step * static_cast<double>(i), of_lap = std::fmod(along, lap_length);
     drive.truth.push_back(on_track(along));
-    const SE3 T_world_vehicle = standing(drive.terrain, drive.truth.back());
+    const SE3 T_world_vehicle = standing(terrain, drive.truth.back());
     const SE3 now = T_world_vehicle * T_vehicle_camera;
     const SO3 level = levelled(T_world_vehicle, level_sigma, random);
     TerrainScan scan;
@@ -188,7 +189,7 @@ Drive simulated_drive(const DriveOptions& options) {
     if (i > 0) {
       const bool bare = of_lap > without_texture_from && of_lap < without_texture_to;
       const auto matches =
-          followed(drive.terrain, before, now, bare ? options.few_matches : options.matches,
+          followed(terrain, before, now, bare ? options.few_matches : options.matches,
                    (bare ? options.blurred : 1) * options.pixel_sigma, disparity_error, options, random);
       const cairn::StereoPose found = cairn::estimate_stereo_pose(
           rig(), matches, {.min_inliers = 5},
@@ -200,7 +201,7 @@ Drive simulated_drive(const DriveOptions& options) {
       const Matrix<6> adjoint = T_vehicle_camera.adjoint();
       put_motion(scan, guess, adjoint * found.covariance * adjoint.transpose(), level_before, level);
     }
-    scan.points = seen_ground(drive.terrain, now, level, options, random);
+    scan.points = seen_ground(terrain, now, level, options, random);
     drive.scans.push_back(std::move(scan));
     before = now;
     level_before = level;

@@ -12,6 +12,8 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include <cairn/core/linalg.hpp>
@@ -54,7 +56,8 @@ struct DriveOptions {
 };
 
 struct Drive {
-  Terrain terrain{5};
+  std::string name = "rendered terrain";
+  std::optional<Terrain> terrain{};  ///< nothing where the ground is a real one
   std::vector<TerrainScan> scans;
   std::vector<cairn::SE2> truth;  ///< of the vehicle at each scan
 };

@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: MIT
 //
 // Gamma-SLAM: rough ground mapped by the spread of its heights, from a stereo camera and visual odometry. The
-// drive is rendered, so that truth is known: two laps, 20 m of each with hardly anything to follow.
+// drive is rendered, so that truth is known: two laps, 20 m of each with hardly anything to follow. Or it is
+// recorded: its frames forwards, then backwards.
 // Exit codes: 0 well; 2 a mistake; 4 interrupted, the results are of the scans before.
 #include <algorithm>
 #include <cstdint>
@@ -17,6 +18,9 @@
 
 #include "drive.hpp"
 #include "outputs.hpp"
+#ifdef GAMMA_SLAM_HAS_RECORDINGS
+#include "recorded_drive.hpp"
+#endif
 #include "run.hpp"
 #include "support/command_line.hpp"
 #include "support/interruption.hpp"
@@ -41,9 +45,12 @@ void print(const Results& r, const std::filesystem::path& out) {
   std::cout << r.scans << " scans, resampled " << r.resampled << " times\n"
             << "mean error: visual odometry " << r.odometry_error() << " m, filter " << r.filter_error()
             << " m\n"
-            << "90 % intervals of sigma hold in " << 100 * r.coverage.share() << " % of " << r.coverage.cells
-            << " cells\n"
-            << "results in " << std::filesystem::absolute(out).lexically_normal().string() << "\n";
+            << "error at the end: visual odometry " << r.odometry_end_error() << " m, filter "
+            << r.filter_end_error() << " m\n";
+  if (r.coverage)
+    std::cout << "90 % intervals of sigma hold in " << 100 * r.coverage->share() << " % of "
+              << r.coverage->cells << " cells\n";
+  std::cout << "results in " << std::filesystem::absolute(out).lexically_normal().string() << "\n";
 }
 
 }  // namespace
@@ -54,6 +61,9 @@ int main(int argc, char** argv) {
   options.threads = std::max(1U, std::thread::hardware_concurrency());
   int laps = 2;
   std::filesystem::path out = "gamma_slam_out";
+#ifdef GAMMA_SLAM_HAS_RECORDINGS
+  RecordedDriveOptions recorded;
+#endif
   CLI::App app{"Maps rough ground by the spread of its heights: particles over a rendered terrain."};
   app.add_option("--cells", options.cells,
                  "what a cell keeps: heights (mean and spread) or variance (spread)")
@@ -61,7 +71,15 @@ int main(int argc, char** argv) {
           std::map<std::string, Cells>{{"heights", Cells::heights}, {"variance", Cells::variance}}));
   app.add_option("--cell-size", options.map.geometry.cell_size, "[m]")
       ->check(example::number_between(0.05, 2));
-  app.add_option("--laps", laps, "of 80 m")->check(example::whole_number(1, 20));
+#ifdef GAMMA_SLAM_HAS_RECORDINGS
+  auto* const folder = app.add_option("--drive", recorded.folder,
+                                      "a folder of recorded stereo images, driven forwards and backwards");
+  app.add_option("--kind", recorded.kind, "of the folder: kitti_raw, kitti_odometry or euroc")
+      ->check(CLI::IsMember({"kitti_raw", "kitti_odometry", "euroc"}))
+      ->needs(folder);
+  app.add_option("--frames", recorded.frames, "only so many")->check(example::whole_number(2))->needs(folder);
+#endif
+  app.add_option("--laps", laps, "of 80 m, of the rendered drive")->check(example::whole_number(1, 20));
   app.add_option("--out", out, "folder for the maps, the trajectory, the summary and the report");
   app.add_option("--particles", options.particles, "number of particles")
       ->check(example::whole_number(1, 10000));
@@ -71,7 +89,14 @@ int main(int argc, char** argv) {
   if (const std::optional<int> code = example::parse(app, name, argc, argv)) return *code;
   return example::exit_code_of(name, [&]() -> int {
     prepare_folder(out);
-    const Drive drive = simulated_drive({.seed = options.seed, .laps = laps});
+    const Drive drive = [&] {
+#ifdef GAMMA_SLAM_HAS_RECORDINGS
+      recorded.seed = options.seed;
+      recorded.threads = options.threads;
+      if (!recorded.folder.empty()) return recorded_drive(recorded);
+#endif
+      return simulated_drive({.seed = options.seed, .laps = laps});
+    }();
     const Results results = run_with_progress(drive, options);
     if (results.ended_early) std::cerr << name << ": " << *results.ended_early << '\n';
     if (const auto no_report = write_outputs(results, out)) std::cout << *no_report << '\n';

@@ -40,10 +40,6 @@ cairn::Trajectory trajectory(const Results& r) {
   return all;
 }
 
-double end_error(const Results& r, const std::vector<SE2>& path) {
-  return path.empty() ? 0 : (path.back().translation() - r.truth.back().translation()).norm();
-}
-
 example::PlaneCurve curve_of(const char* name, Ink ink, const std::vector<SE2>& path) {
   example::PlaneCurve curve{name, ink, {}, {}, false};
   for (const SE2& p : path) {
@@ -80,7 +76,8 @@ void add_map(example::Report& page, const std::string& title, const std::string&
 void add_maps(example::Report& page, const Results& r) {
   add_map(page, "By visual odometry alone",
           "Expected sigma of the heights in cells of " + readable(100 * r.odometry_map.pixel) +
-              " cm, black from 20 cm on, white where nothing was seen. The second lap lies beside the first.",
+              " cm, black from 20 cm on, white where nothing was seen. What is seen again lies beside what "
+              "was seen first.",
           r.odometry_map,
           {marks_of("visual odometry", Ink::wrong, r.odometry_map, r.odometry),
            marks_of("truth", Ink::truth, r.odometry_map, r.truth)});
@@ -94,7 +91,9 @@ void add_maps(example::Report& page, const Results& r) {
           r.filter_map,
           {marks_of("path", Ink::belief, r.filter_map, r.path),
            marks_of("truth", Ink::truth, r.filter_map, r.truth), all});
-  add_map(page, "The terrain's own sigma", "Of the cells that the best particle has seen.", r.true_map, {});
+  if (r.true_map)
+    add_map(page, "The terrain's own sigma", "Of the cells that the best particle has seen.", *r.true_map,
+            {});
 }
 #endif
 
@@ -130,7 +129,7 @@ void add_plots(example::Report& page, const Results& r) {
 
 std::string summary(const Results& r) {
   Json json;
-  json["drive"] = "rendered terrain";
+  json["drive"] = r.drive;
   json["cells"] = r.options.cells == Cells::heights ? "heights" : "variance";
   json["cell_m"] = r.options.map.geometry.cell_size;
   json["seed"] = r.options.seed;
@@ -138,11 +137,12 @@ std::string summary(const Results& r) {
   json["scans"] = r.scans;
   json["resampled"] = r.resampled;
   json["ended_early"] = r.ended_early ? Json(*r.ended_early) : Json(nullptr);
-  json["error_m"] = {{"odometry", {{"mean", r.odometry_error()}, {"end", end_error(r, r.odometry)}}},
-                     {"filter", {{"mean", r.filter_error()}, {"end", end_error(r, r.path)}}}};
-  json["sigma_of_heights"] = {{"cells", r.coverage.cells},
-                              {"covered_by_90_percent", r.coverage.share()},
-                              {"mean_log_ratio", r.coverage.log_ratio}};
+  json["error_m"] = {{"odometry", {{"mean", r.odometry_error()}, {"end", r.odometry_end_error()}}},
+                     {"filter", {{"mean", r.filter_error()}, {"end", r.filter_end_error()}}}};
+  if (r.coverage)
+    json["sigma_of_heights"] = {{"cells", r.coverage->cells},
+                                {"covered_by_90_percent", r.coverage->share()},
+                                {"mean_log_ratio", r.coverage->log_ratio}};
   const auto& p = r.newest.covariance;
   json["newest_pose"] = {
       {"x_m", r.newest.mean.x()},
@@ -154,14 +154,17 @@ std::string summary(const Results& r) {
 }
 
 std::optional<std::string> report(const Results& r) {
-  example::Report page("Gamma-SLAM", "rendered terrain, " + std::to_string(r.options.particles) +
+  example::Report page("Gamma-SLAM", r.drive + ", " + std::to_string(r.options.particles) +
                                          " particles, seed " + std::to_string(r.options.seed));
   if (r.ended_early) page.note(*r.ended_early);
   page.figure(
       {"Error of visual odometry", readable(r.odometry_error()), "m", "mean distance from the truth"});
   page.figure({"Error of the filter", readable(r.filter_error()), "m", "the same, of the best particle"});
-  page.figure({"Cells whose 90 % interval of sigma is right", readable(100 * r.coverage.share()), "%",
-               "of " + std::to_string(r.coverage.cells) + " with ten heights or more"});
+  page.figure({"Where odometry ends", readable(r.odometry_end_error()), "m", "from the truth"});
+  page.figure({"Where the filter ends", readable(r.filter_end_error()), "m", "the same"});
+  if (r.coverage)
+    page.figure({"Cells whose 90 % interval of sigma is right", readable(100 * r.coverage->share()), "%",
+                 "of " + std::to_string(r.coverage->cells) + " with ten heights or more"});
 #ifdef EXAMPLES_HAVE_PNG
   add_maps(page, r);
 #endif

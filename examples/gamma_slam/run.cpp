@@ -28,24 +28,59 @@ Matrix<3> motion_noise(const TerrainScan& scan, bool first, const RunOptions& op
   return scan.moved_covariance + common + exact;
 }
 
-/// Pixels for the square in which the terrain lies, by what is said of each cell: sigma, or nothing.
+/// A rectangle of cells, both corners inside.
+struct CellBox {
+  CellAddress low{cairn::farthest_cell, cairn::farthest_cell}, high{-low.column, -low.row};
+
+  void hold(CellAddress cell) {
+    low = {std::min(low.column, cell.column), std::min(low.row, cell.row)};
+    high = {std::max(high.column, cell.column), std::max(high.row, cell.row)};
+  }
+};
+
+/// The terrain's square where there is one, else what the maps know, and no more than a picture can hold.
+template <class Map>
+CellBox box_of(const std::optional<Terrain>& terrain, const Map& a, const Map& b) {
+  CellBox box;
+  if (terrain) {
+    const auto half =
+        static_cast<std::int32_t>(std::floor(Terrain::half_side / a.options().geometry.cell_size));
+    box.hold({-half, -half});
+    box.hold({half - 1, half - 1});
+    return box;
+  }
+  for (const Map* map : {&a, &b})
+    map->cells().for_each_tile([&](cairn::TileAddress tile, const auto& cells) {
+      const CellAddress corner = cairn::corner_of(tile);
+      for (int i = 0; i < cairn::tile_cells; ++i)
+        if (cells[static_cast<std::size_t>(i)].known())
+          box.hold({corner.column + i % cairn::tile_side, corner.row + i / cairn::tile_side});
+    });
+  constexpr std::int32_t most = 4000;  // cells a side
+  if (box.low.column > box.high.column) return {{0, 0}, {0, 0}};
+  box.high = {std::min(box.high.column, box.low.column + most), std::min(box.high.row, box.low.row + most)};
+  return box;
+}
+
+/// A pixel a cell, by what is said of each: sigma, or nothing.
 template <class SigmaOf>
-SigmaImage image_of(double cell_size, const SigmaOf& sigma_of) {
+SigmaImage image_of(double cell_size, const CellBox& box, const SigmaOf& sigma_of) {
   constexpr double darkest = 0.2;  // [m]
-  const auto half = static_cast<std::int32_t>(std::floor(Terrain::half_side / cell_size));
-  SigmaImage map{cairn::Image(2 * half, 2 * half, 255), -half * cell_size, half * cell_size, cell_size};
-  for (std::int32_t row = 0; row < 2 * half; ++row)
-    for (std::int32_t column = 0; column < 2 * half; ++column)
-      if (const auto sigma = sigma_of(CellAddress{column - half, half - 1 - row}))
+  const std::int32_t columns = box.high.column - box.low.column + 1, rows = box.high.row - box.low.row + 1;
+  SigmaImage map{cairn::Image(columns, rows, 255), box.low.column * cell_size, (box.high.row + 1) * cell_size,
+                 cell_size};
+  for (std::int32_t row = 0; row < rows; ++row)
+    for (std::int32_t column = 0; column < columns; ++column)
+      if (const auto sigma = sigma_of(CellAddress{box.low.column + column, box.high.row - row}))
         map.image(column, row) =
             static_cast<std::uint8_t>(std::lrint(235 * (1 - std::min(1.0, *sigma / darkest))));
   return map;
 }
 
 template <class Cell>
-SigmaImage image_of(const ElevationMap<Cell>& map) {
+SigmaImage image_of(const ElevationMap<Cell>& map, const CellBox& box) {
   const ElevationOptions& options = map.options();
-  return image_of(options.geometry.cell_size, [&](CellAddress at) -> std::optional<double> {
+  return image_of(options.geometry.cell_size, box, [&](CellAddress at) -> std::optional<double> {
     const Cell& cell = map.cells().read(at);
     if (!cell.known()) return std::nullopt;
     return cell.spread(options.prior).expected_sigma();
@@ -110,14 +145,16 @@ void map_drive(Results& r, const Drive& drive, const std::function<std::optional
   r.path.erase(r.path.begin());
   r.newest = belief.pose();
   const Map& best = belief[belief.best()].map;
-  r.odometry_map = image_of(by_odometry);
-  r.filter_map = image_of(best);
-  r.true_map = image_of(options.map.geometry.cell_size, [&](CellAddress at) -> std::optional<double> {
+  const CellBox box = box_of(drive.terrain, best, by_odometry);
+  r.odometry_map = image_of(by_odometry, box);
+  r.filter_map = image_of(best, box);
+  if (!drive.terrain) return;
+  r.true_map = image_of(options.map.geometry.cell_size, box, [&](CellAddress at) -> std::optional<double> {
     const double side = options.map.geometry.cell_size;
     if (!best.cells().read(at).known()) return std::nullopt;
-    return drive.terrain.sigma_in(at.column * side, at.row * side, side);
+    return drive.terrain->sigma_in(at.column * side, at.row * side, side);
   });
-  r.coverage = coverage_of(best, drive.terrain);
+  r.coverage = coverage_of(best, *drive.terrain);
 }
 
 }  // namespace
@@ -129,12 +166,17 @@ double Results::mean_error(const std::vector<SE2>& poses) const {
   return poses.empty() ? 0 : sum / static_cast<double>(poses.size());
 }
 
+double Results::end_error(const std::vector<SE2>& poses) const {
+  return poses.empty() ? 0 : (poses.back().translation() - truth[poses.size() - 1].translation()).norm();
+}
+
 Results run(const Drive& drive, const RunOptions& options,
             const std::function<std::optional<std::string>()>& on_scan) {
   if (options.particles == 0 || options.draws == 0)
     cairn::raise("gamma_slam: expected at least one particle and one draw");
   Results r;
   r.options = options;
+  r.drive = drive.name;
   const auto begin = std::chrono::steady_clock::now();
   if (options.cells == Cells::heights)
     map_drive<cairn::HeightCell>(r, drive, on_scan);

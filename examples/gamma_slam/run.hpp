@@ -63,14 +63,20 @@ struct Results {
   std::vector<cairn::SE2> truth, odometry, path;  ///< one pose a scan; path is the best particle's
   std::vector<std::vector<cairn::SE2>> paths;     ///< of all particles, equal ones once
   cairn::Gaussian<cairn::SE2> newest;
-  SigmaImage odometry_map, filter_map, true_map;
-  Coverage coverage;
+  std::string drive;  ///< its name
+  SigmaImage odometry_map, filter_map;
+  std::optional<SigmaImage> true_map;  ///< where the terrain is known
+  std::optional<Coverage> coverage;
   std::optional<std::string> ended_early;
   double seconds = 0;
 
   /// Mean distance from the truth [m].
   [[nodiscard]] double odometry_error() const { return mean_error(odometry); }
   [[nodiscard]] double filter_error() const { return mean_error(path); }
+  /// How far from the truth the last pose is [m].
+  [[nodiscard]] double odometry_end_error() const { return end_error(odometry); }
+  [[nodiscard]] double filter_end_error() const { return end_error(path); }
+  [[nodiscard]] double end_error(const std::vector<cairn::SE2>& poses) const;
   [[nodiscard]] double mean_error(const std::vector<cairn::SE2>& poses) const;
 };
 

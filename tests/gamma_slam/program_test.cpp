@@ -45,8 +45,9 @@ std::set<std::string> results() {
 TEST_SUITE("gamma_slam/program") {
   TEST_CASE("gamma_slam: a mistake is exit code 2 and a line") {
     const cairn_test::Folder folder;
-    for (const char* mistake : {"--nonsense", "--particles 0", "--threads 0", "--seed -1", "--laps 0",
-                                "--cells stones", "--cell-size 0", "--cell-size nan", "more words"}) {
+    for (const char* mistake :
+         {"--nonsense", "--particles 0", "--threads 0", "--seed -1", "--laps 0", "--cells stones",
+          "--drive nowhere", "--frames 3", "--cell-size 0", "--cell-size nan", "more words"}) {
       CAPTURE(mistake);
       const Outcome outcome = run(std::string(mistake) + " --out \"" + (folder / "out").string() + "\"");
       CAPTURE(outcome.words);

@@ -1,0 +1,45 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// A drive that stereo cameras recorded, forwards and then its frames in reverse order: a loop of real
+/// images.
+///
+/// Visual odometry is found between neighbouring frames, from interest points that both see. A way back over
+/// the same frames would undo its errors exactly, so that each step of either way is perturbed by noise of
+/// its own, which the steps' covariances say; and the heights of the way back are of other points than those
+/// of the way there.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "drive.hpp"
+#include "ground_stereo.hpp"
+
+namespace gamma_slam {
+
+/// What a step of odometry is perturbed by: standard deviations.
+struct OdometryNoise {
+  double along = 0.04;  ///< of its length, along it
+  double side = 0.02;   ///< of its length, to the side
+  double turn = 0.25;   ///< [deg]
+};
+
+struct RecordedDriveOptions {
+  std::string kind = "kitti_raw";  ///< kitti_raw, kitti_odometry or euroc
+  std::filesystem::path folder;
+  std::size_t frames = 0;  ///< only so many; 0 = all
+  std::uint64_t seed = 1;
+  unsigned threads = 1;
+  OdometryNoise noise{};
+  GroundStereoOptions ground{};
+};
+
+/// Throws cairn::Error where the recording cannot be read, odometry fails, no ground is seen or a frame has
+/// no true pose.
+[[nodiscard]] Drive recorded_drive(const RecordedDriveOptions& options);
+
+}  // namespace gamma_slam
