@@ -71,5 +71,6 @@ std::unique_ptr<DescriptorRival> make_hnswlib(std::size_t dim);
 /// Only for coordinates that are whole numbers from 0 to 255.
 std::unique_ptr<DescriptorRival> make_hnswlib_of_bytes(std::size_t dim);
 std::unique_ptr<DescriptorRival> make_faiss_ivf(std::size_t dim);
+std::unique_ptr<DescriptorRival> make_symphony_qg(std::size_t dim);
 
 }  // namespace cairn_bench

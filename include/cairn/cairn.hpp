@@ -99,6 +99,7 @@
 #include <cairn/index/descriptor_file.hpp>
 #include <cairn/index/descriptor_index.hpp>
 #include <cairn/index/index.hpp>
+#include <cairn/index/inner_product.hpp>
 #include <cairn/index/kd_forest.hpp>
 #include <cairn/index/kd_tree.hpp>
 #include <cairn/index/landmark_ledger.hpp>

@@ -23,6 +23,7 @@
 #include <cairn/index/descriptor_file.hpp>
 #include <cairn/index/descriptor_index.hpp>
 #include <cairn/index/index.hpp>
+#include <cairn/index/inner_product.hpp>
 #include <cairn/index/kd_forest.hpp>
 #include <cairn/index/kd_tree.hpp>
 #include <cairn/index/landmark_store.hpp>
@@ -157,6 +158,20 @@ TEST_CASE("docs: the example of descriptor_index.hpp finds a descriptor") {
 #include "snippets/index/descriptor_index_1.inc"
   CHECK(two.id() == 42);
   CHECK(used == std::vector<cairn::PointId>{42});
+}
+
+TEST_CASE("docs: the example of inner_product.hpp finds the largest products") {
+  const Descriptors descriptors = some_descriptors();
+  const auto& query = descriptors[42];
+  std::vector<float> products;
+  const auto use = [&](cairn::PointId id, float product) {
+    float sum = 0;
+    for (std::size_t a = 0; a < 64; ++a) sum += query[a] * descriptors[id][a];
+    CHECK(product == doctest::Approx(sum));
+    products.push_back(product);
+  };
+#include "snippets/index/inner_product_1.inc"
+  CHECK(products.size() == 5);
 }
 
 TEST_CASE("docs: the example of descriptor_file.hpp brings an index back") {

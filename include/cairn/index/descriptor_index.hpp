@@ -542,11 +542,11 @@ private:
         std::copy_n(bytes, left, codes + axis);
       }
       for (std::size_t i = 0; i < detail::block_size; ++i) sum += sums[i];
-      exact = detail::smallest<std::int32_t>(misses) == 0;
+      for (std::size_t i = 0; i < detail::block_size; ++i) exact = exact && misses[i] == 0;
     });
     return exact ? 0 : std::sqrt(sum) * 1.001F + 1e-3F;
   }
-  /// Sixteen coordinates; a miss is -1.
+  /// Sixteen coordinates; what is missed is not zero.
   [[gnu::always_inline]] void encode_block(const float* row, const float* low, std::uint8_t* codes,
                                            detail::Block<float>& sums,
                                            detail::Block<std::int32_t>& misses) const noexcept {
@@ -562,11 +562,17 @@ private:
     inside = inside > top ? top : inside;
     const auto whole = __builtin_convertvector(inside + 0.5F, detail::Block<std::int32_t>);
     const auto code = __builtin_convertvector(whole, detail::Block<float>);
-    const auto bytes = __builtin_convertvector(whole, detail::Block<std::uint8_t>);
-    std::memcpy(codes, &bytes, sizeof(bytes));
+    detail::store_bytes(whole, codes);
     sums += (scaled - code) * (scaled - code);
     // A difference may be rounded to a byte's value, and the point not be there.
-    misses |= (scaled != code) | (from + code * unit_ != numbers);
+    // Compared by their bits, which gcc 12 does side by side; adding zero makes minus zero plus zero.
+    const detail::Block<float> there = from + code * unit_, here = numbers + zero;
+    detail::Block<std::int32_t> bits[4];
+    std::memcpy(&bits[0], &scaled, sizeof(scaled));
+    std::memcpy(&bits[1], &code, sizeof(code));
+    std::memcpy(&bits[2], &there, sizeof(there));
+    std::memcpy(&bits[3], &here, sizeof(here));
+    misses |= (bits[0] ^ bits[1]) | (bits[2] ^ bits[3]);
   }
 
   void check_dimension() const {

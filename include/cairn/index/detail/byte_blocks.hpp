@@ -33,6 +33,22 @@ inline constexpr std::size_t most_byte_axes = 16384;
 /// What one lane of a block holds.
 inline constexpr std::size_t lane_axes = 4;
 
+/// Writes sixteen whole numbers from 0 to 255 as bytes, in two steps: gcc 12 takes them apart one by one.
+[[gnu::always_inline]] inline void store_bytes(const Block<std::int32_t>& numbers,
+                                               std::uint8_t* to) noexcept {
+#if defined(__x86_64__)
+  __m128i quarter[4];
+  std::memcpy(quarter, &numbers, sizeof(numbers));
+  const __m128i low = _mm_packs_epi32(quarter[0], quarter[1]);
+  const __m128i high = _mm_packs_epi32(quarter[2], quarter[3]);
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(to), _mm_packus_epi16(low, high));
+#else
+  const auto halves = __builtin_convertvector(numbers, Block<std::int16_t>);
+  const auto bytes = __builtin_convertvector(halves, Block<std::uint8_t>);
+  std::memcpy(to, &bytes, sizeof(bytes));
+#endif
+}
+
 /// A point that distances are taken from.
 class ByteQuery {
 public:
@@ -46,10 +62,9 @@ public:
     std::int32_t square = 0;
     std::int8_t* shifted = shifted_.data();
     with_widest_lanes([&]() CAIRN_INLINED {
-      for (std::size_t a = 0; a < dim; ++a) {
-        shifted[a] = static_cast<std::int8_t>(codes[a] - 128);
-        square += codes[a] * codes[a];
-      }
+      for (std::size_t a = 0; a < dim; ++a)
+        shifted[a] = static_cast<std::int8_t>(codes[a] ^ 128U);  // less 128
+      for (std::size_t a = 0; a < dim; ++a) square += codes[a] * codes[a];
     });
     square_ = square;
   }
@@ -372,7 +387,9 @@ private:
         low = here < low ? here : low;
       }
       Block<std::int32_t> below{};  // how many of the parts are below each
-      for (std::size_t i = 0; i < block_size; ++i) below -= Block<std::int32_t>{} + low[i] < low;
+      std::int32_t part[block_size];
+      std::memcpy(part, &low, sizeof(low));
+      for (std::size_t i = 0; i < block_size; ++i) below -= Block<std::int32_t>{} + part[i] < low;
       const Block<std::int32_t> candidates =
           below < Block<std::int32_t>{} + static_cast<std::int32_t>(some) ? low : Block<std::int32_t>{} - 1;
       const std::int32_t most = std::min(-smallest<std::int32_t>(-candidates), taken - 1);
@@ -407,15 +424,19 @@ private:
     }
     for (std::size_t begin = 0; begin < sorted_count_; begin += block_size) {
       const std::size_t size = std::min(block_size, sorted_count_ - begin);
-      Block<std::int32_t> keys{}, numbers{}, ranks{};
-      for (std::size_t i = 0; i < size; ++i) keys[i] = taken_[begin + i].key;
-      for (std::size_t i = 0; i < size; ++i) numbers[i] = static_cast<std::int32_t>(begin + i);
+      std::int32_t key[block_size] = {}, number[block_size] = {}, rank[block_size];
+      for (std::size_t i = 0; i < size; ++i) key[i] = taken_[begin + i].key;
+      for (std::size_t i = 0; i < block_size; ++i) number[i] = static_cast<std::int32_t>(begin + i);
+      Block<std::int32_t> keys, numbers, ranks{};
+      load_block<std::int32_t>(key, keys);
+      load_block<std::int32_t>(number, numbers);
       for (std::size_t j = 0; j < sorted_count_; ++j) {
         // Of equals the one that was taken out first, whose place is lower.
         const Block<std::int32_t> later = numbers > Block<std::int32_t>{} + static_cast<std::int32_t>(j);
         ranks -= Block<std::int32_t>{} + taken_[j].key < keys - later;
       }
-      for (std::size_t i = 0; i < size; ++i) sorted_[static_cast<std::size_t>(ranks[i])] = taken_[begin + i];
+      std::memcpy(rank, &ranks, sizeof(ranks));
+      for (std::size_t i = 0; i < size; ++i) sorted_[static_cast<std::size_t>(rank[i])] = taken_[begin + i];
     }
   }
 

@@ -89,8 +89,7 @@ public:
       Block<std::int32_t> whole = __builtin_convertvector(scaled, Block<std::int32_t>);
       const Block<std::int32_t> top = Block<std::int32_t>{} + static_cast<std::int32_t>(most);
       whole = whole < top ? whole : top;
-      const auto bytes = __builtin_convertvector(whole, Block<std::uint8_t>);
-      std::memcpy(entries_.data() + g * codewords, &bytes, sizeof(bytes));
+      store_bytes(whole, entries_.data() + g * codewords);
     }
   }
 
@@ -248,6 +247,25 @@ struct CodeBlockRange {
   [[nodiscard]] std::size_t stride() const noexcept { return (lines + 1) * code_line; }
 };
 
+/// What a search asks of estimates: a point is possible where the estimate less proven * |e| + rounding is
+/// below `below`, and likely where it is less likely * |e|.
+struct CodeLimits {
+  float likely;
+  float proven;
+  float rounding;
+  float below;
+};
+
+/// Of a block's sixteen points, a bit each.
+struct CodeVerdict {
+  unsigned likely;
+  unsigned possible;
+};
+
+/// An |e| of which nothing is known: more than any distance, and no infinity, which there may be among the
+/// estimates, of no point.
+inline constexpr float unknown_missed = 1e30F;
+
 /// From a sum of entries to an estimate: base + step * sum + unit * number.
 struct CodeScale {
   float base;
@@ -323,6 +341,25 @@ struct CodeScale {
     finish_estimates(_mm_add_epi16(_mm256_castsi256_si128(even), _mm256_extracti128_si256(even, 1)),
                      _mm_add_epi16(_mm256_castsi256_si128(odd), _mm256_extracti128_si256(odd, 1)),
                      block + range.lines * code_line, scale, to);
+  }
+}
+
+/// As CodeBlocks::verdicts(), whose |e| begin at `missed`.
+[[gnu::target("avx512f,avx512bw,avx512vl,avx512dq,avx2")]] inline void code_verdicts_avx512(
+    const std::uint8_t* missed, float unit, const CodeBlockRange& range, const float* estimates,
+    const CodeLimits& limits, CodeVerdict* to) noexcept {
+  constexpr __mmask16 all = 0xffff;
+  for (std::size_t b = 0; b < range.count; ++b, missed += range.stride()) {
+    const __m128i whole = _mm_loadu_si128(reinterpret_cast<const __m128i*>(missed));
+    const __m512 known = _mm512_mul_ps(_mm512_maskz_cvtepi32_ps(all, _mm512_maskz_cvtepu8_epi32(all, whole)),
+                                       _mm512_set1_ps(unit));
+    const __m512 error = _mm512_mask_mov_ps(known, _mm_cmpeq_epi8_mask(whole, _mm_set1_epi8(-1)),
+                                            _mm512_set1_ps(unknown_missed));
+    const __m512 estimate = _mm512_loadu_ps(estimates + b * block_size);
+    const __m512 likely = _mm512_sub_ps(estimate, _mm512_mul_ps(error, _mm512_set1_ps(limits.likely)));
+    const __m512 least = _mm512_sub_ps(estimate, _mm512_mul_ps(error, _mm512_set1_ps(limits.proven)));
+    to[b].likely = _mm512_cmp_ps_mask(likely, _mm512_set1_ps(limits.below), _CMP_LT_OQ);
+    to[b].possible = _mm512_cmp_ps_mask(least, _mm512_set1_ps(limits.below + limits.rounding), _CMP_LT_OQ);
   }
 }
 #endif
@@ -404,21 +441,6 @@ private:
   std::vector<float> left_;
 };
 
-/// What a search asks of estimates: a point is possible where the estimate less proven * |e| + rounding is
-/// below `below`, and likely where it is less likely * |e|.
-struct CodeLimits {
-  float likely;
-  float proven;
-  float rounding;
-  float below;
-};
-
-/// Of a block's sixteen points, a bit each.
-struct CodeVerdict {
-  unsigned likely;
-  unsigned possible;
-};
-
 /// Coded points, sixteen to a block.
 class CodeBlocks {
 public:
@@ -486,13 +508,16 @@ public:
   void verdicts(std::size_t first, std::size_t count, const float* estimates, const CodeLimits& limits,
                 CodeVerdict* to) const noexcept {
     const std::uint8_t* missed = &data_[missed_of(first * block_size)];
+#if defined(__x86_64__)
+    if (lane_width() == LaneWidth::avx512)
+      return code_verdicts_avx512(missed, missed_unit_, {data_.data(), lines_, count}, estimates, limits, to);
+#endif
     with_widest_lanes([&]() CAIRN_INLINED {
       for (std::size_t b = 0; b < count; ++b, missed += stride()) {
         Block<float> estimate, whole;
         std::memcpy(&estimate, estimates + b * block_size, sizeof(estimate));
         load_block<float>(missed, whole);
-        // More than any distance, and no infinity: there may be one among the estimates, of no point.
-        const Block<float> unknown = Block<float>{} + 1e30F;
+        const Block<float> unknown = Block<float>{} + unknown_missed;
         const Block<float> error = whole == Block<float>{} + nothing_known ? unknown : whole * missed_unit_;
         to[b].likely = mask_below<float>(estimate - error * limits.likely, limits.below);
         to[b].possible = mask_below<float>(estimate - error * limits.proven, limits.below + limits.rounding);
