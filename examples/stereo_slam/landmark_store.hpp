@@ -24,7 +24,7 @@ struct StoreOptions {
   int dimension = 64;             ///< numbers of a descriptor: 64, 128 or 256
   double ratio = 1.25;            ///< second best over best distance that a match needs
   double max_distance = 0.45;     ///< largest distance of unit descriptors
-  std::size_t leaves = 64;        ///< budget of a search
+  std::size_t leaves = 32;        ///< budget of a search; what it misses the second look finds
   cairn::Probation probation{};   ///< when a landmark becomes a base one, and when it is dropped
   cairn::MultiTreeShape shape{};  ///< n1 and q of the forest
 };
