@@ -88,6 +88,9 @@ int main(int argc, char** argv) {
   app.add_option("--threads", options.threads, "threads")->check(example::whole_number(1, 1024));
   if (const std::optional<int> code = example::parse(app, name, argc, argv)) return *code;
   return example::exit_code_of(name, [&]() -> int {
+#ifdef GAMMA_SLAM_HAS_RECORDINGS
+    if (!recorded.folder.empty()) expect_recording(recorded);
+#endif
     prepare_folder(out);
     const Drive drive = [&] {
 #ifdef GAMMA_SLAM_HAS_RECORDINGS

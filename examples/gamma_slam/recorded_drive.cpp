@@ -157,16 +157,25 @@ SE2 in_plane(const SE3& first, const SE3& pose, const SO3& level) {
   return SE2(t(0), t(1), std::atan2(ahead(1), ahead(0)));
 }
 
-}  // namespace
-
-Drive recorded_drive(const RecordedDriveOptions& options) {
+std::unique_ptr<stereo_slam::Dataset> opened(const RecordedDriveOptions& options) {
   stereo_slam::DatasetOptions which;
   which.kind = options.kind;
   which.folder = options.folder;
   which.frames = options.frames;
   which.threads = options.threads;
-  const std::unique_ptr<stereo_slam::Dataset> data = stereo_slam::open_dataset(which);
+  std::unique_ptr<stereo_slam::Dataset> data = stereo_slam::open_dataset(which);
   if (data->size() < 2) cairn::raise("gamma_slam: expected a recording of at least two frames");
+  return data;
+}
+
+}  // namespace
+
+void expect_recording(const RecordedDriveOptions& options) {
+  static_cast<void>(opened(options));
+}
+
+Drive recorded_drive(const RecordedDriveOptions& options) {
+  const std::unique_ptr<stereo_slam::Dataset> data = opened(options);
   const std::vector<Frame> frames = frames_of(*data, options);
   Drive drive;
   drive.name = data->name() + ", there and back";

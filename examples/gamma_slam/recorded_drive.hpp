@@ -38,6 +38,9 @@ struct RecordedDriveOptions {
   GroundStereoOptions ground{};
 };
 
+/// Throws cairn::Error where there is no such recording: a look that costs little.
+void expect_recording(const RecordedDriveOptions& options);
+
 /// Throws cairn::Error where the recording cannot be read, odometry fails, no ground is seen or a frame has
 /// no true pose.
 [[nodiscard]] Drive recorded_drive(const RecordedDriveOptions& options);

@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstddef>
 #include <numbers>
+#include <optional>
 #include <vector>
 
 #include <cairn/core/cholesky.hpp>
@@ -88,6 +89,17 @@ struct FromMatch {
     const double log_target = l + std::log(peak.mode->share) + cairn::log_density(peak.mode->motion, x);
     const double log_drawn = evidence[chosen] - total + cairn::log_density(peak.q, x);
     return {x, peak.q, log_target - log_drawn, l, peak.mode->regime};
+  }
+
+  /// The Gaussian that poses are drawn from under one motion, if the scan fits there at all.
+  [[nodiscard]] std::optional<cairn::Gaussian<cairn::SE2>> found(const OccupancyMap& map,
+                                                                 const cairn::Gaussian<cairn::SE2>& motion,
+                                                                 const OccupancyMap::Observation& z) const {
+    std::vector<Peak> peaks;
+    Looked looked{map.grid.field(), cairn::thinned(z, thinning)};
+    const Mode mode{0, 1, motion};
+    add_peak(peaks, map, looked, mode, z);
+    return peaks.empty() ? std::nullopt : std::optional(peaks.front().q);
   }
 
 private:

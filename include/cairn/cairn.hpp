@@ -137,6 +137,7 @@
 #include <cairn/models/motion.hpp>
 #include <cairn/models/sensor.hpp>
 #include <cairn/scan/correlative.hpp>
+#include <cairn/scan/independence.hpp>
 #include <cairn/scan/match.hpp>
 #include <cairn/scan/occupancy_grid.hpp>
 #include <cairn/scan/scan.hpp>
