@@ -86,6 +86,36 @@ std::vector<float> noisy_copies(const std::vector<float>& of, std::size_t count,
   return queries;
 }
 
+Descriptors features(std::size_t count, std::size_t dim, std::uint64_t seed) {
+  constexpr std::size_t hidden = 30, queries = 500;
+  cairn::Random random(seed, 3);
+  std::vector<float> map(dim * hidden);
+  for (float& weight : map) weight = static_cast<float>(random.normal());
+  Descriptors result{dim, std::vector<float>(count * dim), std::vector<float>(queries * dim)};
+  const auto draw = [&](float* row) {
+    float factors[hidden];
+    for (float& factor : factors) factor = static_cast<float>(random.normal());
+    for (std::size_t a = 0; a < dim; ++a) {
+      float sum = 0;
+      for (std::size_t k = 0; k < hidden; ++k) sum += map[a * hidden + k] * factors[k];
+      row[a] = std::max(sum, 0.0F) + static_cast<float>(random.normal(0, 0.5));
+    }
+    normalise(row, dim);
+  };
+  for (std::size_t i = 0; i < count; ++i) draw(&result.base[i * dim]);
+  for (std::size_t i = 0; i < queries; ++i) {
+    float* row = &result.queries[i * dim];
+    if (i % 2 == 1) {
+      draw(row);
+      continue;
+    }
+    const float* source = &result.base[random.below(count) * dim];
+    for (std::size_t a = 0; a < dim; ++a)
+      row[a] = source[a] + static_cast<float>(random.normal(0, 0.5 / std::sqrt(static_cast<double>(dim))));
+  }
+  return result;
+}
+
 std::optional<Descriptors> sift() {
   const auto folder = cairn_test::real_data("sift_99k");
   if (!folder) return std::nullopt;

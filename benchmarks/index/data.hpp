@@ -31,6 +31,9 @@ struct Descriptors {
   std::vector<float> base;
   std::vector<float> queries;
 };
+/// Like learned features: unit vectors of `dim` numbers, thirty hidden ones through a random map, rectified,
+/// with noise. Half of the 500 queries are points with noise, half are new.
+Descriptors features(std::size_t count, std::size_t dim, std::uint64_t seed);
 /// 99,000 SIFT descriptors and 1,000 queries.
 std::optional<Descriptors> sift();
 

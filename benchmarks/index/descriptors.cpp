@@ -312,6 +312,11 @@ void score_descriptors(Scoreboard& board) {
     score_mark<64>(board, "clusters, 64 numbers, n = 1e6: 99 % of matches", million,
                    noisy_copies(million, 500, 4), 0.99, true, 2, 4);
   }
+  {
+    const Descriptors learned = features(40000, 256, 5);
+    score_mark<256>(board, "features, 256 numbers, n = 40000: recall 0.95", learned.base, learned.queries,
+                    0.95, false, 1.2, 2);
+  }
   const auto data = sift();
   if (!data) {
     board.add({.name = "128-d SIFT", .note = "no data"});

@@ -21,8 +21,10 @@
 /// auto again = cairn::load_tree<decltype(index)>(in, "file.index", descriptors);
 /// ```
 ///
-/// The points are not in the file. Loading turns them to bytes anew, O(n), and measures every cell, so that
-/// no file, damaged or made up, makes an index whose answers are wrong; a file of other points is refused.
+/// The points are not in the file, nor are their codes. Loading turns them to bytes anew, O(n), learns codes
+/// where they pay (an index that grew may find a little else under a budget then) and measures every cell, so
+/// that no file, damaged or made up, makes an index whose answers are wrong; a file of other points is
+/// refused.
 #pragma once
 
 #include <algorithm>
