@@ -76,8 +76,8 @@ struct PipelineOptions {
   double pixel_sigma = 0.35;     ///< noise of the coordinates of a point of scale 1 [pixels]
   double scale_exponent = 0.65;  ///< it grows with this power of the scale
   GuidedMatchingOptions second_look;
-  std::size_t min_inliers = 10;          ///< fewer: the frame is lost
-  std::size_t relocating_inliers = 25;   ///< fewer: a camera that is lost stays so
+  std::size_t min_inliers = 10;         ///< fewer: the frame is lost
+  std::size_t relocating_inliers = 25;  ///< fewer: a camera that is lost stays so
   /// Farther points are too vague to keep. Where noise decides what is kept, those that it puts too near are:
   /// the limit lies where a landmark weighs little.
   double max_depth_over_baseline = 250;
