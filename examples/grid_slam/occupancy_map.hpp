@@ -13,6 +13,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <vector>
@@ -161,19 +162,28 @@ private:
     if (nx + ny + na == 0) return motion.mean;
     cairn::EndPointModel wide = map.model;
     wide.sigma *= coarse.empty() ? 1 : coarse.front().width;
-    const std::vector<cairn::ScanPoint> few = cairn::thinned(looked.few, 2 * thinning);
+    // No point makes a scan likelier: a pose is left as soon as those looked at make it less likely than the
+    // best, which is most often soon where they look in all directions.
+    constexpr std::size_t parts = 8;
+    std::vector<std::vector<cairn::ScanPoint>> few(parts);
+    const std::vector<cairn::ScanPoint> all = cairn::thinned(looked.few, 2 * thinning);
+    for (std::size_t i = 0; i < all.size(); ++i) few[i % parts].push_back(all[i]);
     cairn::SE2 best = motion.mean;
-    double most = cairn::log_likelihood(map.grid, looked.field, few, best, wide);
+    double most = -std::numeric_limits<double>::infinity();
+    const auto look_at = [&](const cairn::SE2& pose) {
+      double l = 0;
+      for (const auto& part : few) {
+        l += cairn::log_likelihood(map.grid, looked.field, part, pose, wide);
+        if (l <= most) return;
+      }
+      most = l;
+      best = pose;
+    };
+    look_at(motion.mean);
     for (int a = -na; a <= na; ++a)
       for (int y = -ny; y <= ny; ++y)
-        for (int x = -nx; x <= nx; ++x) {
-          const cairn::SE2 pose =
-              cairn::retract(motion.mean, cairn::Vector<3>(reach * x, reach * y, turn * a));
-          const double l = cairn::log_likelihood(map.grid, looked.field, few, pose, wide);
-          if (l <= most) continue;
-          most = l;
-          best = pose;
-        }
+        for (int x = -nx; x <= nx; ++x)
+          look_at(cairn::retract(motion.mean, cairn::Vector<3>(reach * x, reach * y, turn * a)));
     return best;
   }
 };
