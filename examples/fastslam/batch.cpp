@@ -3,7 +3,9 @@
 #include "batch.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <memory>
 #include <string>
 #include <utility>
 
@@ -43,11 +45,16 @@ public:
 
   /// The step of the damped equations (H + damping diag H) d = -g.
   [[nodiscard]] Eigen::VectorXd step(double damping) const {
-    Eigen::SparseMatrix<double> h(gradient_.size(), gradient_.size());
-    h.setFromTriplets(entries_.begin(), entries_.end());
+    Eigen::SparseMatrix<double> h = matrix();
     for (int i = 0; i < gradient_.size(); ++i) h.coeffRef(i, i) *= 1 + damping;
     const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> root(h);
     return root.solve(-gradient_);
+  }
+  /// The lower triangle of H.
+  [[nodiscard]] Eigen::SparseMatrix<double> matrix() const {
+    Eigen::SparseMatrix<double> h(gradient_.size(), gradient_.size());
+    h.setFromTriplets(entries_.begin(), entries_.end());
+    return h;
   }
   [[nodiscard]] BatchOptimum moved(const Eigen::VectorXd& d) const {
     BatchOptimum next = at_;
@@ -150,6 +157,55 @@ BatchOptimum growing_batch_optimum(const LandmarkLog& log, std::size_t by) {
     best = batch_optimum(part, best.poses);
   }
   return best;
+}
+
+struct PathDensity::Equations {
+  BatchOptimum at;
+  Eigen::SparseMatrix<double> h;
+  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> root;
+};
+
+PathDensity::PathDensity(const LandmarkLog& log, BatchOptimum at) {
+  auto equations = std::make_unique<Equations>();
+  equations->at = std::move(at);
+  equations->h = NormalEquations(log, equations->at).matrix();
+  equations->root.compute(equations->h);
+  if (equations->root.info() != Eigen::Success || !(equations->root.vectorD().minCoeff() > 0))
+    cairn::raise("PathDensity: expected a log that determines every pose");
+  equations_ = std::move(equations);
+}
+PathDensity::~PathDensity() = default;
+
+const BatchOptimum& PathDensity::optimum() const noexcept {
+  return equations_->at;
+}
+
+// H = P^T L D L^T P: d = P^T L^-T D^-1/2 z has the covariance H^-1.
+std::vector<SE2> PathDensity::draw(cairn::Random& random) const {
+  const auto& root = equations_->root;
+  Eigen::VectorXd z(root.vectorD().size());
+  for (int i = 0; i < z.size(); ++i) z(i) = random.normal(0, 1) / std::sqrt(root.vectorD()(i));
+  const Eigen::VectorXd d = root.permutationPinv() * Eigen::VectorXd(root.matrixU().solve(z));
+  std::vector<SE2> poses = equations_->at.poses;
+  for (std::size_t k = 0; k < poses.size(); ++k)
+    poses[k] = cairn::retract(poses[k], Vector<3>(d.segment<3>(3 * static_cast<int>(k))));
+  return poses;
+}
+
+// The marginal's information is H_xx - H_xm H_mm^-1 H_mx, and landmarks do not meet each other in H.
+double PathDensity::log_density(const std::vector<SE2>& poses) const {
+  const auto& [at, h, root] = *equations_;
+  Eigen::VectorXd e = Eigen::VectorXd::Zero(h.rows());
+  for (std::size_t k = 0; k < poses.size(); ++k)
+    e.segment<3>(3 * static_cast<int>(k)) = cairn::local(at.poses[k], poses[k]);
+  const Eigen::VectorXd v = h.selfadjointView<Eigen::Lower>() * e;
+  double squared = e.dot(v);
+  for (int row = 3 * static_cast<int>(poses.size()); row < h.rows(); row += 2) {
+    Matrix<2> block;
+    block << h.coeff(row, row), h.coeff(row + 1, row), h.coeff(row + 1, row), h.coeff(row + 1, row + 1);
+    squared -= cairn::Cholesky<2>(block).whiten(Vector<2>(v.segment<2>(row))).squaredNorm();
+  }
+  return -0.5 * squared;
 }
 
 }  // namespace fastslam

@@ -9,9 +9,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <vector>
 
 #include <cairn/core/linalg.hpp>
+#include <cairn/core/random.hpp>
 #include <cairn/manifold/se2.hpp>
 
 #include "landmark_log.hpp"
@@ -34,5 +36,23 @@ struct BatchOptimum {
 /// The same of the log's first frames and then of more and more, each begun where the last ended and moved on
 /// by odometry: no start is needed, and drift does not grow before a loop corrects it.
 [[nodiscard]] BatchOptimum growing_batch_optimum(const LandmarkLog& log, std::size_t by = 50);
+
+/// The Gaussian about a batch optimum that has its curvature (Laplace's approximation), of the poses alone:
+/// landmarks are integrated out.
+class PathDensity {
+public:
+  /// Throws cairn::Error where the optimum's equations are singular.
+  PathDensity(const LandmarkLog& log, BatchOptimum at);
+  ~PathDensity();
+
+  [[nodiscard]] const BatchOptimum& optimum() const noexcept;
+  [[nodiscard]] std::vector<cairn::SE2> draw(cairn::Random& random) const;
+  /// But for a constant.
+  [[nodiscard]] double log_density(const std::vector<cairn::SE2>& poses) const;
+
+private:
+  struct Equations;
+  std::unique_ptr<const Equations> equations_;
+};
 
 }  // namespace fastslam

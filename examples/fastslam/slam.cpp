@@ -9,7 +9,12 @@
 #include <utility>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/parallel.hpp>
+#include <cairn/core/random.hpp>
+#include <cairn/core/statistics.hpp>
 #include <cairn/filter/conditional.hpp>
+
+#include "batch.hpp"
 
 namespace fastslam {
 
@@ -34,6 +39,71 @@ std::vector<SE2> means_of(const Belief& belief, std::size_t particle) {
   for (const auto& each : belief.path(particle)) poses.push_back(each.drawn_from.mean);
   poses.erase(poses.begin());  // the start
   return poses;
+}
+
+/// What the particles' own model says of a path: its map, and log p(x_1:t, z_1:t).
+struct Replayed {
+  std::vector<cairn::PathPose<SE2>> path;
+  Map map;
+  double log_density = 0;
+};
+Replayed replayed(const LandmarkLog& log, const std::vector<SE2>& poses, Map map) {
+  Replayed r{{}, std::move(map)};
+  const cairn::Gaussian<SE2> start{SE2(), cairn::Matrix<3>::Zero()};
+  r.path.push_back({start.mean, start, start.mean, start.mean, 0});
+  cairn::Random none(1);  // names leave nothing to draw
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    const Frame& frame = log.frames[k];
+    const SE2 before = r.path.back().pose;
+    const cairn::Gaussian<SE2> motion{before * frame.moved.mean, log.motion_factor * frame.moved.covariance};
+    const auto chosen = r.map.choose(poses[k], frame.seen, none);
+    r.log_density += cairn::log_density(motion, poses[k]) + chosen.log_likelihood;
+    r.map.insert(poses[k], frame.seen, chosen.choice);
+    r.path.push_back({poses[k], {poses[k], cairn::Matrix<3>::Zero()}, before, poses[k], k + 1});
+  }
+  return r;
+}
+
+/// All paths drawn again: from the Gaussian about the optimum of the log so far, weighed by what the
+/// particles' own model says of them over that density. Importance sampling of the same distribution as the
+/// filter's, which never goes back: with that alone a bend between two visits stays, and where no particle
+/// came back right, none ever will. O(M frames log landmarks), and a sparse least squares.
+/// `optimum` is where the last one was, and then where this one is.
+Belief redrawn(const Belief& belief, const LandmarkLog& log, const SlamOptions& options,
+               std::vector<SE2>& optimum) {
+  LandmarkLog part{.name = log.name, .sensor = log.sensor.scaled(log.sighting_factor)};
+  const std::size_t frames = belief.steps();
+  part.frames.assign(log.frames.begin(), log.frames.begin() + static_cast<std::ptrdiff_t>(frames));
+  for (Frame& frame : part.frames) frame.moved.covariance *= log.motion_factor;
+  const std::vector<SE2> best = means_of(belief, belief.best());
+  for (std::size_t k = optimum.size(); k < frames; ++k)
+    optimum.push_back(k == 0 ? best[0] : optimum[k - 1] * best[k - 1].inverse() * best[k]);
+  const PathDensity density(part, batch_optimum(part, optimum));
+  optimum = density.optimum().poses;
+  const Map empty(part.sensor, options.landmarks);
+  std::vector<std::optional<Replayed>> drawn(belief.size());
+  std::vector<double> log_weights(belief.size());
+  cairn::parallel_for(belief.size(), options.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      cairn::Random random(~options.seed, (frames << 32U) + i);  // not the filter's
+      const std::vector<SE2> poses = density.draw(random);
+      drawn[i] = replayed(log, poses, empty);
+      log_weights[i] = drawn[i]->log_density - density.log_density(poses);
+    }
+  });
+  const double total = cairn::log_sum_exp(log_weights);
+  cairn::PathsRecord<SE2> record{.nodes = {}, .particles = {}, .step = frames};
+  std::vector<Map> maps;
+  for (std::size_t i = 0; i < belief.size(); ++i) {
+    std::uint32_t parent = 0xffffffffU;
+    for (const auto& pose : drawn[i]->path) {
+      record.nodes.push_back({pose, parent});
+      parent = static_cast<std::uint32_t>(record.nodes.size() - 1);
+    }
+    record.particles.push_back({parent, log_weights[i] - total, log_weights[i] - total, 0});
+    maps.push_back(std::move(drawn[i]->map));
+  }
+  return {record, std::move(maps)};
 }
 
 /// Weighted mean of all particles' paths, pose by pose.
@@ -108,6 +178,13 @@ void measure_landmarks(Results& r, const LandmarkLog& log) {
   if (found.size() >= 2) r.landmark_error = rms(found, is, rigid_fit(found, is));
 }
 
+bool all_named(const LandmarkLog& log) {
+  return std::ranges::all_of(log.frames, [](const Frame& frame) {
+    return std::ranges::all_of(frame.seen,
+                               [](const auto& sighting) { return sighting.identity.has_value(); });
+  });
+}
+
 bool has_identities(const LandmarkLog& log) {
   for (const Frame& frame : log.frames)
     for (const auto& sighting : frame.seen)
@@ -180,12 +257,16 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
   Belief belief(SE2(), Map(log.sensor.scaled(log.sighting_factor), options.landmarks), options.particles);
   const cairn::ConditionalFilter filter{
       .resample_below = options.resample_below, .seed = options.seed, .threads = options.threads};
-  std::vector<SE2> odometry;
+  const bool redraws =
+      options.redraw_every > 0 && options.proposal == ProposalKind::landmarks && all_named(log);
+  std::vector<SE2> odometry, optimum;
   const std::size_t every = std::max<std::size_t>(1, log.frames.size() / 40);
   for (const Frame& frame : log.frames) {
     const cairn::MappingStep did = step(filter, belief, frame, log.motion_factor, options.proposal);
     if (!did.accepted())
       cairn::raise("frame " + std::to_string(odometry.size()) + ": " + explain(did.status));
+    if (redraws && belief.steps() % options.redraw_every == 0)
+      belief = redrawn(belief, log, options, optimum);
     odometry.push_back(odometry.empty() ? frame.moved.mean : odometry.back() * frame.moved.mean);
     r.steps.push_back({frame.time,
                        did.effective_size,

@@ -45,8 +45,8 @@ TEST_SUITE("fastslam/program") {
     const cairn_test::Folder folder;
     for (const std::string mistake :
          {"--nonsense", "--particles 0", "--threads 0", "--seed -1", "--data mars", "--robot 6",
-          "--identities perhaps", "--proposal none", "--association guessed", "--frames 0", "--data map",
-          "--data mrclam --folder /nowhere", "--data map --name none --folder /nowhere"}) {
+          "--identities perhaps", "--proposal none", "--association guessed", "--frames 0", "--redraw -1",
+          "--data map", "--data mrclam --folder /nowhere", "--data map --name none --folder /nowhere"}) {
       CAPTURE(mistake);
       const Outcome outcome = run(mistake + " --out \"" + (folder / "out").string() + "\"");
       CAPTURE(outcome.words);

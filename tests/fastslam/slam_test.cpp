@@ -102,6 +102,40 @@ TEST_SUITE("fastslam/slam") {
     CHECK_THROWS_AS(static_cast<void>(batch_optimum(log, {})), cairn::Error);
   }
 
+  TEST_CASE("fastslam: paths drawn about the optimum are spread as their density says") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    const LandmarkLog log = simulated(loop_map(), seed, 60);
+    const PathDensity density(log, growing_batch_optimum(log));
+    CHECK(density.log_density(density.optimum().poses) == 0);
+    cairn::Random random(seed);
+    constexpr int draws = 200;
+    double squared = 0;
+    for (int i = 0; i < draws; ++i) squared -= 2 * density.log_density(density.draw(random)) / draws;
+    // landmarks are drawn with the poses, and integrated out of the density
+    CHECK(cairn::chi_square_mean_band(3.0 * 60, draws, 0.999).contains(squared));
+  }
+
+  TEST_CASE("fastslam: paths drawn again come nearer to the optimum than those that never go back") {
+    double drawn_again = 0, never = 0;
+    cairn::RunningMoments nees;
+    for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+      const LandmarkLog log = simulated(loop_map(), seed, 200);
+      const std::vector<SE2> optimum = growing_batch_optimum(log).poses;
+      for (const std::size_t every : {50U, 0U}) {
+        const Results r = run(log, {.particles = 20, .seed = seed, .redraw_every = every});
+        const std::vector<SE2> path = frame_poses(log, r.mean);
+        for (std::size_t k = 0; k < path.size(); ++k)
+          (every > 0 ? drawn_again : never) +=
+              (path[k].translation() - optimum[k].translation()).squaredNorm();
+        if (every > 0) nees.add(*r.steps[99].nees);
+      }
+    }
+    MESSAGE("sums of squares ", drawn_again, ", ", never, "; NEES ", nees.mean());
+    CHECK(drawn_again < 0.5 * never);
+    CHECK(cairn::chi_square_mean_band(3, 5, 0.999).contains(nees.mean()));
+  }
+
   TEST_CASE("fastslam: with the start known NEES is about its number of dimensions, for both filters") {
     cairn::RunningMoments particles, joint;
     for (std::uint64_t seed = 1; seed <= 8; ++seed) {

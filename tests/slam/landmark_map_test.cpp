@@ -145,10 +145,18 @@ Drive drive(std::uint64_t seed) {
 }
 
 /// Squared distance of the particles' mean pose and landmarks from the joint filter's.
-double squared_error(const Drive& d, std::size_t count, std::uint64_t seed) {
+double squared_error(const Drive& d, std::size_t count, std::uint64_t seed,
+                     const ConditionalFilter& options = {}, const FromLandmarks& proposal = {}) {
   MappedPaths<Map> belief(Plane::Zero(), Map({}, keep_all), count);
-  const ConditionalFilter filter{.seed = seed};
-  for (const auto& z : d.seen) REQUIRE(filter.step(belief, motion, FromLandmarks{}, z).accepted());
+  ConditionalFilter filter = options;
+  filter.seed = seed;
+  for (const auto& z : d.seen) {
+    const auto did = filter.step(belief, motion, proposal, z);
+    REQUIRE(did.accepted());
+    if (!filter.redraw || !did.resampled) continue;
+    for (std::size_t i = 1; i < count; ++i) REQUIRE(belief[i].pose != belief[i - 1].pose);
+    REQUIRE(belief.path(0).back().pose == belief[0].pose);
+  }
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(d.exact.mean.size());
   const std::vector<double> weights = belief.particles().weights();
   for (std::size_t i = 0; i < count; ++i) {
@@ -274,6 +282,22 @@ TEST_SUITE("slam/landmark_map") {
     MESSAGE("slope ", slope);
     CHECK(slope == doctest::Approx(-0.5).epsilon(0.2));  // +-0.1
     CHECK(std::exp(errors[2]) < 0.1);
+  }
+
+  TEST_CASE(
+      "landmark_map: copies that draw poses of their own are as many poses, and their mean is no worse") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    const Drive d = drive(seed);
+    const ConditionalFilter redraw{.resample_below = 1, .redraw = true};
+    const FromLandmarks evidence{.weight = FromLandmarks::Weight::evidence};
+    double own = 0, shared = 0;
+    for (std::uint64_t run = seed * 1000; run < seed * 1000 + 200; ++run) {
+      own += squared_error(d, 30, run, redraw, evidence);
+      shared += squared_error(d, 30, run, {.resample_below = 1});
+    }
+    MESSAGE("squared errors ", own, ", ", shared);
+    CHECK(own < 1.25 * shared);
   }
 
   TEST_CASE("landmark_map: the likeliest association is the best of all injective ones") {
