@@ -259,14 +259,17 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
       .resample_below = options.resample_below, .seed = options.seed, .threads = options.threads};
   const bool redraws =
       options.redraw_every > 0 && options.proposal == ProposalKind::landmarks && all_named(log);
+  std::size_t next_redraw = options.redraw_every;
   std::vector<SE2> odometry, optimum;
   const std::size_t every = std::max<std::size_t>(1, log.frames.size() / 40);
   for (const Frame& frame : log.frames) {
     const cairn::MappingStep did = step(filter, belief, frame, log.motion_factor, options.proposal);
     if (!did.accepted())
       cairn::raise("frame " + std::to_string(odometry.size()) + ": " + explain(did.status));
-    if (redraws && belief.steps() % options.redraw_every == 0)
+    if (redraws && belief.steps() == next_redraw) {
       belief = redrawn(belief, log, options, optimum);
+      next_redraw += std::max<std::size_t>(options.redraw_every, next_redraw / 8);
+    }
     odometry.push_back(odometry.empty() ? frame.moved.mean : odometry.back() * frame.moved.mean);
     r.steps.push_back({frame.time,
                        did.effective_size,

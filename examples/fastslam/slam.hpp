@@ -33,9 +33,9 @@ struct SlamOptions {
   unsigned threads = 1;
   ProposalKind proposal = ProposalKind::landmarks;
   double resample_below = 0.5;
-  /// Where every sighting has a name, with FastSLAM 2.0: all paths are drawn again every so many frames from
-  /// the Gaussian about the least squares of the log so far, and weighed. 0: never, which is FastSLAM as
-  /// published.
+  /// Where every sighting has a name, with FastSLAM 2.0: all paths are drawn again from the Gaussian about
+  /// the least squares of the log so far, and weighed. Every so many frames and an eighth of those before,
+  /// whichever is more, so that a log costs O(its length). 0: never, which is FastSLAM as published.
   std::size_t redraw_every = 250;
   cairn::LandmarkOptions landmarks{.pick = cairn::Pick::drawn, .gate = 0.999};
 };

@@ -90,7 +90,7 @@ TEST_SUITE("fastslam/program") {
   TEST_CASE("fastslam: interrupted, it writes the frames until then") {
     const cairn_test::Folder folder;
     CHECK(cairn_test::interrupt_program(
-              {program, "--particles", "50", "--frames", "100000", "--out", (folder / "out").string()},
+              {program, "--particles", "50", "--frames", "20000", "--out", (folder / "out").string()},
               {SIGTERM}, 1) == 4);
     CHECK(names_in(folder / "out") == results());
     const auto summary = nlohmann::json::parse(cairn::read_file(folder / "out" / "summary.json"));
