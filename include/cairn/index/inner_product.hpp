@@ -141,8 +141,8 @@ struct ProductHit {
   bool operator==(const ProductHit&) const = default;
 };
 
-/// The k points of the largest products with the query, largest first: of all or, under a budget, of those
-/// that the search meets. `index` is one over `points`. Throws as lifted().
+/// The k points of the largest products with the query, largest first, of equal ones the smaller id: of all
+/// or, under a budget, of those that the search meets. `index` is one over `points`. Throws as lifted().
 template <class Index, PointSet Points, Point Query>
 [[nodiscard]] std::vector<ProductHit> largest_products(const Index& index,
                                                        const InnerProductPoints<Points>& points,
@@ -153,8 +153,9 @@ template <class Index, PointSet Points, Point Query>
   std::vector<ProductHit> hits;
   for (const auto& neighbour : index.nearest(row, k, budget))
     hits.push_back({neighbour.id, points.product(row, neighbour.id)});
-  std::stable_sort(hits.begin(), hits.end(),
-                   [](const ProductHit& a, const ProductHit& b) { return a.product > b.product; });
+  std::sort(hits.begin(), hits.end(), [](const ProductHit& a, const ProductHit& b) {
+    return a.product != b.product ? a.product > b.product : a.id < b.id;
+  });
   return hits;
 }
 
