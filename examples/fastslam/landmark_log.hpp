@@ -40,9 +40,6 @@ struct Between {
 struct LandmarkLog {
   std::string name{};
   PointSensor sensor{};
-  /// Variances that the particle filter takes, over the log's own. 1 for every log; to see what a wider
-  /// motion does for few particles where a loop closes.
-  double motion_factor = 1, sighting_factor = 1;
   std::vector<Frame> frames{};
   std::vector<Between> between{};
   std::vector<cairn::StampedPose2> truth{};               ///< by growing times; none where it is not known

@@ -29,13 +29,6 @@ struct PointSensor {
   double half_view = std::numbers::pi / 2;  ///< [rad] to either side
   double detection = 0;  ///< probability that a landmark in view is reported; 0: not seeing says nothing
 
-  /// The same with variances of so many times these.
-  [[nodiscard]] PointSensor scaled(double variance) const {
-    PointSensor other = *this;
-    for (double* sigma : {&other.range_sigma, &other.bearing_sigma, &other.across_sigma})
-      *sigma *= std::sqrt(variance);
-    return other;
-  }
   [[nodiscard]] Measurement predict(const State& x, const Part& m) const {
     return cairn::RangeBearing{.beacon = m}.predict(x);
   }

@@ -25,9 +25,9 @@ using cairn::StampedPose2;
 using cairn::Vector;
 
 cairn::MappingStep step(const cairn::ConditionalFilter& filter, Belief& belief, const Frame& frame,
-                        double factor, ProposalKind kind) {
+                        ProposalKind kind) {
   const auto motion = [&](const SE2& x, std::size_t) {
-    return cairn::Gaussian<SE2>{x * frame.moved.mean, factor * frame.moved.covariance};
+    return cairn::Gaussian<SE2>{x * frame.moved.mean, frame.moved.covariance};
   };
   return kind == ProposalKind::motion ? filter.step(belief, motion, cairn::FromMotion{}, frame.seen)
                                       : filter.step(belief, motion, cairn::FromLandmarks{}, frame.seen);
@@ -55,7 +55,7 @@ Replayed replayed(const LandmarkLog& log, const std::vector<SE2>& poses, Map map
   for (std::size_t k = 0; k < poses.size(); ++k) {
     const Frame& frame = log.frames[k];
     const SE2 before = r.path.back().pose;
-    const cairn::Gaussian<SE2> motion{before * frame.moved.mean, log.motion_factor * frame.moved.covariance};
+    const cairn::Gaussian<SE2> motion{before * frame.moved.mean, frame.moved.covariance};
     const auto chosen = r.map.choose(poses[k], frame.seen, none);
     r.log_density += cairn::log_density(motion, poses[k]) + chosen.log_likelihood;
     r.map.insert(poses[k], frame.seen, chosen.choice);
@@ -71,10 +71,9 @@ Replayed replayed(const LandmarkLog& log, const std::vector<SE2>& poses, Map map
 /// `optimum` is where the last one was, and then where this one is.
 Belief redrawn(const Belief& belief, const LandmarkLog& log, const SlamOptions& options,
                std::vector<SE2>& optimum) {
-  LandmarkLog part{.name = log.name, .sensor = log.sensor.scaled(log.sighting_factor)};
+  LandmarkLog part{.name = log.name, .sensor = log.sensor};
   const std::size_t frames = belief.steps();
   part.frames.assign(log.frames.begin(), log.frames.begin() + static_cast<std::ptrdiff_t>(frames));
-  for (Frame& frame : part.frames) frame.moved.covariance *= log.motion_factor;
   const std::vector<SE2> best = means_of(belief, belief.best());
   for (std::size_t k = optimum.size(); k < frames; ++k)
     optimum.push_back(k == 0 ? best[0] : optimum[k - 1] * best[k - 1].inverse() * best[k]);
@@ -254,7 +253,7 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
   for (const auto& [id, place] : log.landmarks) r.true_landmarks.push_back(place);
   const auto begin = std::chrono::steady_clock::now();
   const std::clock_t cpu = std::clock();
-  Belief belief(SE2(), Map(log.sensor.scaled(log.sighting_factor), options.landmarks), options.particles);
+  Belief belief(SE2(), Map(log.sensor, options.landmarks), options.particles);
   const cairn::ConditionalFilter filter{
       .resample_below = options.resample_below, .seed = options.seed, .threads = options.threads};
   const bool redraws =
@@ -263,7 +262,7 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
   std::vector<SE2> odometry, optimum;
   const std::size_t every = std::max<std::size_t>(1, log.frames.size() / 40);
   for (const Frame& frame : log.frames) {
-    const cairn::MappingStep did = step(filter, belief, frame, log.motion_factor, options.proposal);
+    const cairn::MappingStep did = step(filter, belief, frame, options.proposal);
     if (!did.accepted())
       cairn::raise("frame " + std::to_string(odometry.size()) + ": " + explain(did.status));
     if (redraws && belief.steps() == next_redraw) {
