@@ -202,11 +202,13 @@ cairn::Gaussian<SE2> Mapper::place_in_window(const cairn::StampedScan& scan) {
     evidence.push_back(options_.evidence_share * result.log_likelihood);
   }
   const double total = cairn::log_sum_exp(evidence);
-  for (std::size_t i = 0; i < starts.size(); ++i)
-    places_.push_back({starts[i].mean, std::exp(evidence[i] - total)});
-  const std::size_t best = static_cast<std::size_t>(
-      std::ranges::max_element(places_, {}, &PossiblePlace::share) - places_.begin());
-  std::ranges::stable_sort(places_, std::ranges::greater{}, &PossiblePlace::share);
+  // The likeliest first, of equals the one that was found first.
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    const double share = std::exp(evidence[i] - total);
+    const auto next = std::ranges::upper_bound(places_, share, std::ranges::greater{}, &PossiblePlace::share);
+    places_.insert(next, {starts[i].mean, share});
+  }
+  const auto best = static_cast<std::size_t>(std::ranges::max_element(evidence) - evidence.begin());
   return starts[best];
 }
 

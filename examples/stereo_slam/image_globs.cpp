@@ -163,7 +163,8 @@ Recording read_images(const ImageGlobs& images) {
     recording.frames.push_back({i, time, file, right[pairs[i].second], std::nullopt});
   }
   if (clock)
-    std::ranges::stable_sort(recording.frames, {}, &RecordedFrame::time);
+    std::ranges::sort(recording.frames, {},
+                      [](const RecordedFrame& frame) { return std::pair(frame.time, frame.index); });
   else if (!images.rate)
     recording.notes.push_back("the names of the images are no times: " + cairn::shortest(assumed_rate) +
                               " frames a second are assumed (--fps says otherwise)");
