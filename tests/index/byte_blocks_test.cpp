@@ -11,6 +11,7 @@
 #include <cairn/core/random.hpp>
 #include <cairn/index/detail/byte_blocks.hpp>
 
+#include "support/lane_widths.hpp"
 #include "support/random.hpp"
 
 namespace detail = cairn::detail;
@@ -55,19 +56,10 @@ std::size_t wrong_distances(std::size_t dim, std::size_t blocks, cairn::Random& 
 TEST_SUITE("byte_blocks") {
   TEST_CASE("distances are exact, whatever the processor offers and the number of coordinates") {
     cairn::Random random(cairn_test::seed(86));
-    const auto all_right = [&] {
+    cairn_test::for_each_lane_width([&] {
       for (std::size_t dim = 1; dim <= 130; ++dim) CHECK(wrong_distances(dim, dim % 3 + 1, random) == 0);
       CHECK(wrong_distances(detail::most_byte_axes, 1, random) == 0);
-    };
-    all_right();
-#if defined(__x86_64__)
-    const auto widest = detail::lane_width();
-    for (int width = 0; width < static_cast<int>(widest); ++width) {
-      detail::lane_width() = static_cast<detail::LaneWidth>(width);
-      all_right();
-    }
-    detail::lane_width() = widest;
-#endif
+    });
   }
 
   TEST_CASE("the farthest points of the most coordinates fit 32 bits") {

@@ -19,6 +19,7 @@
 #include "index/generators.hpp"
 #include "support/data.hpp"
 #include "support/folder.hpp"
+#include "support/lane_widths.hpp"
 #include "support/random.hpp"
 #include "support/violation.hpp"
 
@@ -135,23 +136,15 @@ TEST_SUITE("kd_tree") {
   }
 
   TEST_CASE("kd_tree: narrow and wide vectors find the same") {
-#if defined(__x86_64__)
-    using cairn::detail::LaneWidth;
     cairn::Random random(cairn_test::seed(4));
     const auto numbers = cairn_test::make_points<float>("uniform", 3000, 3, random);
     const cairn::KdTree<float, 3> tree(cairn::Rows<float>(numbers, 3));
-    const LaneWidth widest = cairn::detail::lane_width();
     for (int i = 0; i < 200; ++i) {
       const std::array query{static_cast<float>(random.uniform()), static_cast<float>(random.uniform()),
                              0.5F};
       const auto expected = tree.nearest(query, 7);
-      for (int width = 0; width <= static_cast<int>(widest); ++width) {
-        cairn::detail::lane_width() = static_cast<LaneWidth>(width);
-        check_same_distances(tree.nearest(query, 7), expected);
-      }
-      cairn::detail::lane_width() = widest;
+      cairn_test::for_each_lane_width([&] { check_same_distances(tree.nearest(query, 7), expected); });
     }
-#endif
   }
 
   TEST_CASE("kd_tree: depth is logarithmic and leaves are full, also when all points are equal") {

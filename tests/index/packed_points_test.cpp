@@ -15,6 +15,7 @@
 
 #include "index/generators.hpp"
 #include "support/folder.hpp"
+#include "support/lane_widths.hpp"
 #include "support/random.hpp"
 
 namespace packed_points_test {
@@ -88,14 +89,8 @@ TEST_SUITE("packed_points") {
     CHECK(differing(found, by_definition(points, queries, 64)) == 0);
     CHECK(nearest_two(packed, Rows<float>(queries, 64), 3) == found);
     CHECK(nearest_two(packed, Rows<float>(queries, 64), 100) == found);
-#if defined(__x86_64__)
-    const auto widest = cairn::detail::lane_width();
-    for (int width = 0; width < static_cast<int>(widest); ++width) {
-      cairn::detail::lane_width() = static_cast<cairn::detail::LaneWidth>(width);
-      CHECK(differing(nearest_two(packed, Rows<float>(queries, 64)), found) == 0);
-    }
-    cairn::detail::lane_width() = widest;
-#endif
+    cairn_test::for_each_lane_width(
+        [&] { CHECK(differing(nearest_two(packed, Rows<float>(queries, 64)), found) == 0); });
   }
 
   TEST_CASE("packed_points: distances are those of a kd-tree to the last bit") {

@@ -12,6 +12,7 @@
 #include <cairn/core/random.hpp>
 #include <cairn/index/detail/product_codes.hpp>
 
+#include "support/lane_widths.hpp"
 #include "support/random.hpp"
 
 namespace detail = cairn::detail;
@@ -114,7 +115,7 @@ TEST_SUITE("product_codes") {
     const std::uint64_t seed = cairn_test::seed(91);
     CAPTURE(seed);
     cairn::Random random(seed);
-    const auto all_right = [&] {
+    cairn_test::for_each_lane_width([&] {
       for (const std::string kind : {"normal", "uniform", "equal", "ends"})
         for (const std::size_t dim : {1U, 3U, 4U, 5U, 31U, 32U, 33U, 64U, 100U, 128U, 130U})
           for (const std::size_t count : {1U, 15U, 16U, 50U}) {
@@ -129,16 +130,7 @@ TEST_SUITE("product_codes") {
           }
       const Cell large("uniform", 3000, 20, random);  // entries of tables become coarse
       CHECK(wrong_verdicts(large, drawn("uniform", 3000, random).data()) == 0);
-    };
-    all_right();
-#if defined(__x86_64__)
-    const auto widest = detail::lane_width();
-    for (int width = 0; width < static_cast<int>(widest); ++width) {
-      detail::lane_width() = static_cast<detail::LaneWidth>(width);
-      all_right();
-    }
-    detail::lane_width() = widest;
-#endif
+    });
   }
 
   TEST_CASE("product_codes: a code is the nearest codeword, and learning beats any sixteen points") {
