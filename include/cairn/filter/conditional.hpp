@@ -484,15 +484,8 @@ struct ConditionalFilter {
     result.effective_size = belief.particles_.effective_size();
     if (result.effective_size < resample_below * static_cast<double>(belief.size())) {
       Random random(seed, stream(belief.steps(), all_particles));
-      std::vector<std::size_t> copies;
       belief.resample(scheme, random);
-      if (redraw)
-        for (std::size_t i = 1; i < belief.size(); ++i)
-          if (belief[i].node == belief[i - 1].node) copies.push_back(i);
-      for (const std::size_t i : copies) {
-        Random own(seed, stream(belief.steps(), belief.size() + i));
-        belief.redraw(i, own);
-      }
+      if (redraw) redraw_copies(belief);
       result.resampled = true;
     }
     if (insert) insert_in_all(belief, z);
@@ -500,6 +493,20 @@ struct ConditionalFilter {
   }
 
 private:
+  /// Of the copies that resampling made of one particle, which follow each other, all but the first.
+  template <ConditionalMap M>
+  void redraw_copies(MappedPaths<M>& belief) const {
+    std::uint32_t shared = belief[0].node;
+    for (std::size_t i = 1; i < belief.size(); ++i) {
+      if (belief[i].node != shared) {
+        shared = belief[i].node;
+        continue;
+      }
+      Random own(seed, stream(belief.steps(), belief.size() + i));
+      belief.redraw(i, own);
+    }
+  }
+
   /// Copies that resampling made of one particle, which follow each other, take the observation in once and
   /// go on sharing their map.
   template <ConditionalMap M>

@@ -429,45 +429,40 @@ struct FromLandmarks {
   }
 
 private:
+  /// A sighting as one of a landmark.
   struct Known {
     std::size_t sighting;
     std::uint32_t landmark;
-    double log_volume;
+    double log_volume;      // of the uncertainty of where the landmark is seen
+    bool is_alone = false;  // the only candidate
   };
+  /// Those that others may contradict first, then the surest.
   static void sort_surest_first(std::vector<Known>& known) {
     std::sort(known.begin(), known.end(), [](const Known& a, const Known& b) {
-      return std::tie(a.log_volume, a.sighting, a.landmark) < std::tie(b.log_volume, b.sighting, b.landmark);
-    });
-  }
-
-  /// A candidate to begin with.
-  struct Beginning {
-    std::size_t sighting;
-    std::uint32_t landmark;
-    bool is_alone;      // the only candidate
-    double log_volume;  // of the uncertainty of where the landmark is seen
-  };
-  template <LandmarkSensor L, class F>
-  [[nodiscard]] std::vector<Beginning> beginnings(const LandmarkMap<L, F>& map,
-                                                  const typename LandmarkMap<L, F>::Candidates& candidates,
-                                                  const typename L::State& x,
-                                                  const typename LandmarkMap<L, F>::Observation& z) const {
-    using Model = detail::ModelOf<L>;
-    std::vector<Beginning> all;
-    for (std::size_t k = 0; k < z.size(); ++k) {
-      const std::size_t first = all.size();
-      candidates.for_each(k, [&](std::uint32_t n, double) {
-        const auto& model = detail::model_of(map.sensor(), z[k].z);
-        const detail::SensorOfPose<Model> sensor{model, map.find(n)->belief};
-        all.push_back(
-            {k, n, false, Cholesky<dof<typename Model::Measurement>>(sensor.noise(x)).log_determinant()});
-      });
-      if (all.size() == first + 1) all.back().is_alone = true;
-    }
-    std::sort(all.begin(), all.end(), [](const Beginning& a, const Beginning& b) {
       return std::tie(a.is_alone, a.log_volume, a.sighting, a.landmark) <
              std::tie(b.is_alone, b.log_volume, b.sighting, b.landmark);
     });
+  }
+  template <LandmarkSensor L, class F>
+  static Known as_known(const LandmarkMap<L, F>& map, const typename L::State& x,
+                        const typename LandmarkMap<L, F>::Observation& z, std::size_t k, std::uint32_t n) {
+    using Model = detail::ModelOf<L>;
+    const auto& model = detail::model_of(map.sensor(), z[k].z);
+    const detail::SensorOfPose<Model> sensor{model, map.find(n)->belief};
+    return {k, n, Cholesky<dof<typename Model::Measurement>>(sensor.noise(x)).log_determinant()};
+  }
+  template <LandmarkSensor L, class F>
+  [[nodiscard]] std::vector<Known> beginnings(const LandmarkMap<L, F>& map,
+                                              const typename LandmarkMap<L, F>::Candidates& candidates,
+                                              const typename L::State& x,
+                                              const typename LandmarkMap<L, F>::Observation& z) const {
+    std::vector<Known> all;
+    for (std::size_t k = 0; k < z.size(); ++k) {
+      const std::size_t first = all.size();
+      candidates.for_each(k, [&](std::uint32_t n, double) { all.push_back(as_known(map, x, z, k, n)); });
+      if (all.size() == first + 1) all.back().is_alone = true;
+    }
+    sort_surest_first(all);
     return all;
   }
 
@@ -482,7 +477,7 @@ private:
     double most = take_in(q, map, z, best.choice);
     std::vector<Association> tried{best.choice};
     int in_vain = 0;
-    for (const Beginning& each : beginnings(map, candidates, motion.mean, z)) {
+    for (const Known& each : beginnings(map, candidates, motion.mean, z)) {
       if (++in_vain > hypotheses) break;
       q = motion;
       const auto& model = detail::model_of(map.sensor(), z[each.sighting].z);
@@ -512,15 +507,10 @@ private:
     double log_evidence = 0;
     std::vector<Known> known;
     for (std::size_t k = 0; k < z.size(); ++k) {
-      const auto* landmark = map.find(n[k]);
-      if (landmark == nullptr) {
+      if (map.find(n[k]) == nullptr)
         log_evidence += map.log_density_of(n[k]);
-        continue;
-      }
-      const auto& model = detail::model_of(map.sensor(), z[k].z);
-      const detail::SensorOfPose<Model> sensor{model, landmark->belief};
-      known.push_back(
-          {k, n[k], Cholesky<dof<typename Model::Measurement>>(sensor.noise(q.mean)).log_determinant()});
+      else
+        known.push_back(as_known(map, q.mean, z, k, n[k]));
     }
     sort_surest_first(known);
     for (const Known& each : known) {
@@ -580,7 +570,7 @@ auto LandmarkMap<L, F>::candidates(const Gaussian<Pose>& x, const Observation& z
   for (std::size_t k = 0; k < z.size(); ++k) {
     Alternatives& of = all.of[k];
     of.is_named = z[k].identity.has_value();
-    const double gate = of.is_named ? common_->gate_of_named : common_->gate;
+    const double gate = gate_of(z[k]);
     const auto add = [&](std::uint32_t number) {
       if (const auto found = candidate(x, z[k].z, number, gate)) of.known.push_back(*found);
     };
@@ -652,8 +642,7 @@ auto LandmarkMap<L, F>::narrowed(const Candidates& candidates, const Gaussian<Po
   for (std::size_t k = 0; k < z.size(); ++k) {
     left.of[k].known.clear();
     for (const Candidate& c : candidates.of[k].known)
-      if (const auto still = candidate(x, z[k].z, c.landmark,
-                                       candidates.of[k].is_named ? common_->gate_of_named : common_->gate))
+      if (const auto still = candidate(x, z[k].z, c.landmark, gate_of(z[k])))
         left.of[k].known.push_back(*still);
   }
   return left;
