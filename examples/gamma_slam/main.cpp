@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <iostream>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <thread>
@@ -89,14 +90,15 @@ int main(int argc, char** argv) {
   if (const std::optional<int> code = example::parse(app, name, argc, argv)) return *code;
   return example::exit_code_of(name, [&]() -> int {
 #ifdef GAMMA_SLAM_HAS_RECORDINGS
-    if (!recorded.folder.empty()) expect_recording(recorded);
+    recorded.seed = options.seed;
+    recorded.threads = options.threads;
+    std::shared_ptr<const stereo_slam::Dataset> recording;  // what is none is said before a folder is made
+    if (!recorded.folder.empty()) recording = opened_recording(recorded);
 #endif
     prepare_folder(out);
     const Drive drive = [&] {
 #ifdef GAMMA_SLAM_HAS_RECORDINGS
-      recorded.seed = options.seed;
-      recorded.threads = options.threads;
-      if (!recorded.folder.empty()) return recorded_drive(recorded);
+      if (recording) return recorded_drive(*recording, recorded);
 #endif
       return simulated_drive({.seed = options.seed, .laps = laps});
     }();

@@ -157,28 +157,23 @@ SE2 in_plane(const SE3& first, const SE3& pose, const SO3& level) {
   return SE2(t(0), t(1), std::atan2(ahead(1), ahead(0)));
 }
 
-std::unique_ptr<stereo_slam::Dataset> opened(const RecordedDriveOptions& options) {
+}  // namespace
+
+std::shared_ptr<const stereo_slam::Dataset> opened_recording(const RecordedDriveOptions& options) {
   stereo_slam::DatasetOptions which;
   which.kind = options.kind;
   which.folder = options.folder;
   which.frames = options.frames;
   which.threads = options.threads;
-  std::unique_ptr<stereo_slam::Dataset> data = stereo_slam::open_dataset(which);
+  std::shared_ptr<const stereo_slam::Dataset> data = stereo_slam::open_dataset(which);
   if (data->size() < 2) cairn::raise("gamma_slam: expected a recording of at least two frames");
   return data;
 }
 
-}  // namespace
-
-void expect_recording(const RecordedDriveOptions& options) {
-  static_cast<void>(opened(options));
-}
-
-Drive recorded_drive(const RecordedDriveOptions& options) {
-  const std::unique_ptr<stereo_slam::Dataset> data = opened(options);
-  const std::vector<Frame> frames = frames_of(*data, options);
+Drive recorded_drive(const stereo_slam::Dataset& data, const RecordedDriveOptions& options) {
+  const std::vector<Frame> frames = frames_of(data, options);
   Drive drive;
-  drive.name = data->name() + ", there and back";
+  drive.name = data.name() + ", there and back";
   const auto add = [&](std::size_t frame, TerrainScan scan, double time, bool back) {
     scan.time = time;
     scan.points = half_of(frames[frame].ground.points, back ? 1 : 0);
@@ -190,7 +185,7 @@ Drive recorded_drive(const RecordedDriveOptions& options) {
   SE3 guess;
   add(0, {}, frames[0].time, false);
   for (std::size_t i = 1; i < frames.size(); ++i) {
-    const cairn::StereoPose pose = moved(data->rig(), frames[i - 1], frames[i], guess);
+    const cairn::StereoPose pose = moved(data.rig(), frames[i - 1], frames[i], guess);
     guess = pose.T_world_camera;
     steps.push_back(step_of(pose, frames[i - 1].ground, frames[i].ground));
     TerrainScan scan = steps.back();

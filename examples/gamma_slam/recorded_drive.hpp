@@ -14,10 +14,15 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 
 #include "drive.hpp"
 #include "ground_stereo.hpp"
+
+namespace stereo_slam {
+class Dataset;
+}
 
 namespace gamma_slam {
 
@@ -38,11 +43,13 @@ struct RecordedDriveOptions {
   GroundStereoOptions ground{};
 };
 
-/// Throws cairn::Error where there is no such recording: a look that costs little.
-void expect_recording(const RecordedDriveOptions& options);
+/// Opens the recording, which costs little. Throws cairn::Error where there is none, or one of less than two
+/// frames.
+[[nodiscard]] std::shared_ptr<const stereo_slam::Dataset> opened_recording(
+    const RecordedDriveOptions& options);
 
-/// Throws cairn::Error where the recording cannot be read, odometry fails, no ground is seen or a frame has
-/// no true pose.
-[[nodiscard]] Drive recorded_drive(const RecordedDriveOptions& options);
+/// Throws cairn::Error where an image cannot be read, odometry fails, no ground is seen or a frame has no
+/// true pose.
+[[nodiscard]] Drive recorded_drive(const stereo_slam::Dataset& data, const RecordedDriveOptions& options);
 
 }  // namespace gamma_slam

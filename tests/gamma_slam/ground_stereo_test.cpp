@@ -113,8 +113,9 @@ TEST_SUITE("gamma_slam/ground_stereo") {
     const auto folder = cairn_test::real_data("kitti_raw_0926");
     if (!folder) return;
     const auto with = [&](unsigned threads) {
-      const Drive drive = recorded_drive(
-          {.folder = *folder, .frames = 16, .seed = 2, .threads = threads, .noise = {0.1, 0.05, 1}});
+      const RecordedDriveOptions options{
+          .folder = *folder, .frames = 16, .seed = 2, .threads = threads, .noise = {0.1, 0.05, 1}};
+      const Drive drive = recorded_drive(*opened_recording(options), options);
       return run(drive, {.particles = 40, .threads = threads});
     };
     const Results one = with(1), two = with(2);
