@@ -22,6 +22,7 @@
 #include <CLI/CLI.hpp>
 
 #include <cairn/core/check.hpp>
+#include <cairn/io/file.hpp>
 
 #include "dataset.hpp"
 #include "outputs.hpp"
@@ -50,6 +51,18 @@ struct Arguments {
   std::string calibrate = "auto";
   std::string motion = "off";
 };
+
+/// Takes the words of a choice.
+template <class Names>
+CLI::Validator one_of(const Names& names) {
+  return CLI::IsMember(std::vector<std::string>(names.begin(), names.end()));
+}
+
+/// The choice that a word stands for, which is one of `names`, in the order of the enumeration.
+template <class Choice, class Names>
+Choice choice_of(const Names& names, const std::string& word) {
+  return static_cast<Choice>(std::ranges::find(names, word) - names.begin());
+}
 
 /// Everything the command line can say; CLI11 ends the program by an exception on --help and on mistakes.
 void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& dataset) {
@@ -101,20 +114,17 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
                  "the rig's calibration is corrected while moving: auto (where the first frame shows that it "
                  "is off), on,\n"
                  "off, or drifting (for rigs that come loose)")
-      ->check(CLI::IsMember(std::vector<std::string>(stereo_slam::calibration_names.begin(),
-                                                     stereo_slam::calibration_names.end())))
+      ->check(one_of(stereo_slam::calibration_names))
       ->capture_default_str();
   app.add_option("--motion", arguments.motion,
                  "a filter follows the camera's motion: off, ekf, iterated or ukf. It narrows the search, "
                  "carries the "
                  "camera\nover frames that show nothing and refuses poses that it cannot have come to")
-      ->check(CLI::IsMember(
-          std::vector<std::string>(stereo_slam::motion_names.begin(), stereo_slam::motion_names.end())))
+      ->check(one_of(stereo_slam::motion_names))
       ->capture_default_str();
   app.add_option("--features", arguments.features,
                  "interest points: surf, or OpenCV's sift or orb where it was there when building")
-      ->check(CLI::IsMember(
-          std::vector<std::string>(stereo_slam::feature_names.begin(), stereo_slam::feature_names.end())))
+      ->check(one_of(stereo_slam::feature_names))
       ->capture_default_str();
   app.add_option("--script", arguments.dataset.arena.script,
                  "arena: turn (on the spot), loop (two laps) or spiral")
@@ -258,15 +268,12 @@ int main(int argc, char** argv) {
     arguments.dataset.arena.seed = arguments.pipeline.seed;
     arguments.pipeline.store.kind =
         arguments.store == "multi" ? stereo_slam::StoreKind::multi : stereo_slam::StoreKind::single;
-    const auto name = std::ranges::find(stereo_slam::feature_names, arguments.features);
     arguments.pipeline.features =
-        static_cast<stereo_slam::FeatureKind>(name - stereo_slam::feature_names.begin());
-    const auto calibrate = std::ranges::find(stereo_slam::calibration_names, arguments.calibrate);
+        choice_of<stereo_slam::FeatureKind>(stereo_slam::feature_names, arguments.features);
     arguments.pipeline.calibrate =
-        static_cast<stereo_slam::Calibration>(calibrate - stereo_slam::calibration_names.begin());
-    const auto motion = std::ranges::find(stereo_slam::motion_names, arguments.motion);
+        choice_of<stereo_slam::Calibration>(stereo_slam::calibration_names, arguments.calibrate);
     arguments.pipeline.motion.filter =
-        static_cast<stereo_slam::Motion>(motion - stereo_slam::motion_names.begin());
+        choice_of<stereo_slam::Motion>(stereo_slam::motion_names, arguments.motion);
     auto frames = stereo_slam::open_dataset(arguments.dataset);
     if (arguments.there_and_back) frames = stereo_slam::there_and_back(std::move(frames));
     if (!arguments.dump.empty()) {
@@ -296,7 +303,7 @@ int main(int argc, char** argv) {
     if (!arguments.save_rig.empty())
       example::write_rig(arguments.save_rig, stereo_slam::learned_rig(given, done.record));
     const std::optional<std::string> no_report = stereo_slam::write_outputs(done.record, arguments.out);
-    if (live) live->finish(run_report(done.record, summarise(done.record)));
+    if (live && !no_report) live->finish(cairn::read_file(arguments.out / "report.html"));
     print_summary(done.record);
     if (arguments.there_and_back && !done.record.ended_early) print_return(done.record);
     if (no_report) std::cout << "no report.html: " << *no_report << '\n';

@@ -90,7 +90,7 @@ struct LivePage::Server {
 };
 
 LivePage::LivePage(std::uint16_t port) : server_(std::make_unique<Server>()) {
-  if (!has_report_page()) cairn::raise(why_no_report());
+  if (const auto why = why_no_live_page()) cairn::raise(*why);
   sockaddr_in address{};
   address.sin_family = AF_INET;
   address.sin_port = htons(port);
@@ -124,15 +124,13 @@ void LivePage::show(Report report) {
   if (auto html = report.html()) server_->put(std::move(*html), number);
 }
 
-void LivePage::finish(const Report& report, std::chrono::milliseconds patience) {
+void LivePage::finish(std::string html, std::chrono::milliseconds patience) {
   const std::uint64_t number = server_->version + 1;
-  auto html = report.html();
-  if (!html) return;
   const bool watched = [&] {
     const std::lock_guard lock(server_->mutex);
     return server_->last_asked != Clock::time_point{} && Clock::now() - server_->last_asked < patience;
   }();
-  server_->put(std::move(*html), number);
+  server_->put(std::move(html), number);
   if (!watched) return;
   std::unique_lock lock(server_->mutex);
   server_->fetched.wait_for(lock, patience, [&] { return server_->version_fetched == number; });
@@ -166,7 +164,7 @@ bool LivePage::wanted(std::chrono::milliseconds) const {
   return false;
 }
 void LivePage::show(Report) {}
-void LivePage::finish(const Report&, std::chrono::milliseconds) {}
+void LivePage::finish(std::string, std::chrono::milliseconds) {}
 
 }  // namespace example
 

@@ -9,7 +9,7 @@
 ///   while (work()) {
 ///     if (live.wanted()) live.show(report_so_far);   // made only where somebody looks
 ///   }
-///   live.finish(report);
+///   live.finish(html_of_the_finished_report);
 ///
 /// The page asks once a second whether there is a newer one, and loads that unless its reader holds it.
 /// Nobody but this machine can reach it, and nothing can be changed through it.
@@ -44,7 +44,7 @@ public:
   void show(Report report);
   /// The finished page: it asks for no newer one. Waits for those who look to have it, at most for
   /// `patience`.
-  void finish(const Report& report, std::chrono::milliseconds patience = std::chrono::milliseconds(3000));
+  void finish(std::string html, std::chrono::milliseconds patience = std::chrono::milliseconds(3000));
 
 private:
   struct Server;

@@ -72,7 +72,7 @@ TEST_CASE("live page: the last page asks for no other, and waits for those who l
   const std::uint16_t port = port_of(live);
   const auto seconds = [&](const std::string& title) {
     const auto begin = std::chrono::steady_clock::now();
-    live.finish(titled(title), 500ms);
+    live.finish(titled(title).html().value(), 500ms);
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   };
   CHECK(seconds("nobody looks") < 0.4);
@@ -96,7 +96,7 @@ TEST_CASE("live page: a browser that looks gets the next page by itself") {
   live.show(titled("under way"));
   std::jthread run([&](const std::stop_token& stop) {
     while (!stop.stop_requested() && !live.wanted(0ms)) std::this_thread::sleep_for(5ms);
-    live.finish(titled("done"));
+    live.finish(titled("done").html().value());
   });
   const cairn_test::Folder folder;
   const cairn_test::OpenedPage opened = cairn_test::open_address(folder, live.address());
