@@ -18,8 +18,8 @@
 // smoother's is widest in the middle; and the smoothed way bends before the tunnel already.
 // CHANGE THIS (answers at the end of the file)
 //   1. Make the tunnel 20 s long (steps = 60, out = 40). How much wider does either get, at its widest?
-//   2. Make the cyclist ride straight on (density 1e-6). What becomes of the two?
-//   3. At the last step filter and smoother agree. At the first, which one is surer, and why?
+//   2. Make the cyclist ride straight on (density 1e-6). What becomes of the two in the tunnel?
+//   3. (No change.) At the last step filter and smoother agree. At the first, which is surer, and why?
 #include <algorithm>
 #include <cmath>
 
@@ -146,5 +146,5 @@ int main(int argc, char** argv) {
   return lesson.finish();
 }
 // ANSWERS  1. The filter's 2 sigma from 24 to 68 m, by 2 to the power 1.5; the smoother's from 4.8 to 11 m.
-// 2. 4.4 and 1.7 m: who rides straight on needs no receiver in a tunnel.
+// 2. 4 m and 1 m at its end: who rides straight on needs no receiver in a tunnel.
 // 3. The smoother, 3.7 m against 6 m: it has seen the ride, the filter has only guessed.

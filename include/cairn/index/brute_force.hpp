@@ -56,24 +56,24 @@ public:
   [[nodiscard]] std::size_t bytes() const noexcept { return rows_.capacity() * sizeof(Scalar); }
 
   /// The nearest point; the first of equally near ones.
-  template <Point Query>
+  template <QueryPoint Query>
   [[nodiscard]] std::optional<Hit> nearest(const Query& query, Budget = {}) const {
     return detail::nearest_of<Real>(metric_, [&](auto& collector) { search(query, collector); });
   }
 
   /// The k nearest points, nearest first.
-  template <Point Query>
+  template <QueryPoint Query>
   [[nodiscard]] std::vector<Hit> nearest(const Query& query, std::size_t k, Budget = {}) const {
     return detail::k_nearest_of<Real>(k, size(), metric_, [&](auto& collector) { search(query, collector); });
   }
   /// Writes the nearest points, nearest first, as many as `found` has room for; returns how many.
-  template <Point Query>
+  template <QueryPoint Query>
   std::size_t nearest(const Query& query, std::span<Hit> found) const {
     return detail::nearest_into(found, metric_, [&](auto& collector) { search(query, collector); });
   }
 
   /// All points at most `radius` away, nearest first. Throws Error where that is negative or NaN.
-  template <Point Query>
+  template <QueryPoint Query>
   [[nodiscard]] std::vector<Hit> within(const Query& query, Real radius) const {
     return detail::all_within(radius, metric_, [&](auto& collector) { search(query, collector); });
   }

@@ -104,24 +104,24 @@ public:
   }
 
   /// The nearest point, of all or of those that a search under a budget meets.
-  template <Point Query>
+  template <QueryPoint Query>
   [[nodiscard]] std::optional<Hit> nearest(const Query& query, Budget budget = {}) const {
     return detail::nearest_of<float>(L2{},
                                      [&](auto& collector) { search(query, collector, {.budget = budget}); });
   }
   /// The k nearest, nearest first.
-  template <Point Query>
+  template <QueryPoint Query>
   [[nodiscard]] std::vector<Hit> nearest(const Query& query, std::size_t k, Budget budget = {}) const {
     return detail::k_nearest_of<float>(
         k, size(), L2{}, [&](auto& collector) { search(query, collector, {.budget = budget}); });
   }
   /// Writes the nearest points, nearest first, as many as `found` has room for; returns how many.
-  template <Point Query>
+  template <QueryPoint Query>
   std::size_t nearest(const Query& query, std::span<Hit> found) const {
     return detail::nearest_into(found, L2{}, [&](auto& collector) { search(query, collector); });
   }
   /// All points at most `radius` away, nearest first. Throws Error where that is negative or NaN.
-  template <Point Query>
+  template <QueryPoint Query>
   [[nodiscard]] std::vector<Hit> within(const Query& query, float radius) const {
     return detail::all_within(radius, L2{}, [&](auto& collector) { search(query, collector); });
   }

@@ -161,36 +161,36 @@ public:
   void finish_merges() { forest_.finish_merges(); }
 
   /// The nearest point; nothing where there is none.
-  template <Point Query>
+  template <QueryPoint Query>
   [[nodiscard]] std::optional<Hit> nearest(const Query& query) const {
     return detail::nearest_of<Real>(metric_, [&](auto& collector) { search(query, collector); });
   }
   /// The nearest of those that a search under a budget meets.
-  template <Point Query>
+  template <QueryPoint Query>
   [[nodiscard]] std::optional<Hit> nearest(const Query& query, Budget budget) const {
     return detail::nearest_of<Real>(metric_,
                                     [&](auto& collector) { search(query, collector, {.budget = budget}); });
   }
 
   /// The k nearest points, nearest first; all of them where there are fewer.
-  template <Point Query>
+  template <QueryPoint Query>
   [[nodiscard]] std::vector<Hit> nearest(const Query& query, std::size_t k) const {
     return detail::k_nearest_of<Real>(k, size(), metric_, [&](auto& collector) { search(query, collector); });
   }
-  template <Point Query>
+  template <QueryPoint Query>
   [[nodiscard]] std::vector<Hit> nearest(const Query& query, std::size_t k, Budget budget) const {
     return detail::k_nearest_of<Real>(k, size(), metric_,
                                       [&](auto& collector) { search(query, collector, {.budget = budget}); });
   }
 
   /// Writes the nearest points, nearest first, as many as `found` has room for; returns how many.
-  template <Point Query>
+  template <QueryPoint Query>
   std::size_t nearest(const Query& query, std::span<Hit> found) const {
     return detail::nearest_into(found, metric_, [&](auto& collector) { search(query, collector); });
   }
 
   /// All points at most `radius` away, nearest first. Throws Error where that is negative or NaN.
-  template <Point Query>
+  template <QueryPoint Query>
   [[nodiscard]] std::vector<Hit> within(const Query& query, Real radius) const {
     return detail::all_within(radius, metric_, [&](auto& collector) { search(query, collector); });
   }

@@ -59,6 +59,19 @@ struct PointHasBrackets {
       "it: Through(points, 3, [](const P& p, std::size_t axis) { return axis == 0 ? p.x : ...; })");
 };
 
+/// Ends in the sentence, which names the type of the query.
+template <class Q>
+struct QueryHasBrackets {
+  static_assert(
+      Point<Q>,
+      "cairn: a query needs [axis] that gives a number, as std::array{q.x, q.y} has; cairn::Through "
+      "sees a set of points without it");
+};
+
+/// False, after the sentence: of what is asked for and is no point.
+template <class Q>
+inline constexpr bool explain_query = (static_cast<void>(sizeof(QueryHasBrackets<Q>)), false);
+
 /// False; or, of a container of what is no point, the sentence. Stands where a set is asked for:
 /// `PointSet<S> || detail::explain_points<S>`.
 template <class S>
@@ -93,6 +106,11 @@ concept MatrixThatStays = MatrixInMemory<std::remove_cvref_t<Matrix>> &&
                           (std::is_lvalue_reference_v<Matrix> || !owns_memory<std::remove_cvref_t<Matrix>>);
 
 }  // namespace detail
+
+/// What is asked for: a point. Of anything else the sentence ends the compilation, so that this is for the
+/// functions of an index, not for asking whether a type is a point.
+template <class Q>
+concept QueryPoint = Point<Q> || detail::explain_query<Q>;
 
 /// Flat memory seen as points: `dim` numbers each, one after the other. The rows or the columns of a matrix
 /// lie so in one of its two layouts only: rows_of() and columns_of() see them in both.
