@@ -143,5 +143,6 @@ int main(int argc, char** argv) {
   return lesson.finish();
 }
 // ANSWERS  1. (3/4)^8 = 10 %, and 128 leaves: points move farther from themselves, the others are where they
-// were. 2. No: 91 of 1024. Two more medians stand between a point and its copy, not four times as many.
+// were. 2. No: 91 of 1024 at most, before 32 of 256. Two more medians stand between a point and its copy, not
+// four times as many.
 // 3. Easier: what is found late is far from the query, and seldom clearly nearer than the next.

@@ -14,8 +14,8 @@
 // (M. Montemerlo et al., FastSLAM 2.0, IJCAI 2003; S. Thrun et al., Probabilistic Robotics, table 13.3.)
 // Look for: trails fan out; where the loop closes few survive, and all have one past. Resampling forgets: the
 // NEES is good at first, then climbs and stays up (T. Bailey, J. Nieto, E. Nebot, ICRA 2006).
-// Now change this (answers at the end): (1) 10 particles in place of 100. (2) cairn::FromMotion{} in place of
-// the proposal: FastSLAM 1.0. (3) 400 particles: for how long is the NEES good now?
+// Now change this (answers at the end): (1) particles = 10. (2) cairn::FromMotion{} in place of the
+// last `proposal`: FastSLAM 1.0. (3) particles = 400: for how long is the NEES good now?
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -88,7 +88,7 @@ int main(int argc, char** argv) {
        {{"nothing-drawn", "the pose is the proposal's mean (PythonRobotics, fast_slam2.py, #149)"},
         {"shared-maps", "copies of a particle write into one map (PythonRobotics, fast_slam2.py)"}}},
       argc, argv);
-  constexpr std::size_t runs = 6;
+  constexpr std::size_t runs = 6, particles = 100;
   std::vector<double> steps(lesson.steps()), nees(steps.size()), effective(steps.size());
   double posts = 0;
   example::PlaneFilm film{"Trails of ten particles, first run", "", {"east", "m"}, {"north", "m"}, {"step"}};
@@ -105,7 +105,7 @@ int main(int argc, char** argv) {
     cairn::Random random(lesson.seed(), run);
     const auto landmarks = world.landmarks(random);
     const auto log = world.drive(landmarks, lesson.steps(), random);
-    cairn::MappedPaths<Map> belief(world.start(), Map{lesson.mistake("shared-maps")}, 100);
+    cairn::MappedPaths<Map> belief(world.start(), Map{lesson.mistake("shared-maps")}, particles);
     const cairn::ConditionalFilter filter{.seed = lesson.seed() + run};
     for (std::size_t k = 0; k < log.size(); ++k) {
       const auto motion = [&](const SE2& pose, std::size_t) { return world.moved(pose, log[k].control); };
@@ -117,7 +117,7 @@ int main(int argc, char** argv) {
       effective[k] = done.effective_size;
       if (k % 10 != 9) continue;
       example::PlaneFrame frame{steps[k], "", {}};
-      for (std::size_t i = 0; i < 100; i += 10) {
+      for (std::size_t i = 0; i < particles; i += particles / 10) {
         frame.curves.push_back({.name = "trails"});
         for (const auto& at : belief.path(i)) extend(frame.curves.back(), at.pose.translation());
       }

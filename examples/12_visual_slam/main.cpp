@@ -31,7 +31,7 @@
 //   1. --steps 24, the same round with larger steps: what grows?
 //   2. From picture 30 on leave the landmarks of the first 10 out of step 3: how far from the start does it
 //   end?
-//   3. budget = 2 leaves: how many links are lost, and does the pose suffer?
+//   3. .leaves = 2 in step 3, for 32: how many links are lost, and does the pose suffer?
 #include <algorithm>
 #include <array>
 #include <cmath>

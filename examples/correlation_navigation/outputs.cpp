@@ -14,6 +14,7 @@
 #include <nlohmann/json.hpp>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/statistics.hpp>
 #include <cairn/io/file.hpp>
 #include <cairn/io/text.hpp>
 
@@ -57,6 +58,22 @@ std::vector<double> scaled(std::vector<double> values, double factor) {
 std::vector<double> sizes(std::vector<double> values) {
   for (double& value : values) value = std::abs(value);
   return values;
+}
+
+/// The words ", 95 % within 1.0 to 1.2"; none for an interval that is not known.
+std::string interval(const cairn::ConsistencyBand& of, double factor = 1) {
+  if (!(of.high > 0)) return "";
+  return ", 95 % within " + readable(factor * of.low, 3) + " to " + readable(factor * of.high, 3);
+}
+
+/// 95 % of a share of so many trials (E. Wilson, "Probable inference, the law of succession, and statistical
+/// inference", J. Am. Stat. Assoc. 22, 1927).
+cairn::ConsistencyBand share_interval(double share, std::size_t trials) {
+  if (trials == 0) return {};
+  const double n = static_cast<double>(trials), z2 = 1.96 * 1.96;
+  const double middle = share + z2 / (2 * n);
+  const double reach = std::sqrt(z2 * (share * (1 - share) / n + z2 / (4 * n * n)));
+  return {std::max(0.0, (middle - reach) / (1 + z2 / n)), std::min(1.0, (middle + reach) / (1 + z2 / n))};
 }
 
 void add_straight(example::Report& page, const Results& r) {
@@ -149,9 +166,8 @@ void add_planar(example::Report& page, const PlanarResult& r) {
       .title = "A flight with turns",
       .caption =
           "The start is known to 2 km: a correlation search finds it, the filter tracks through the turns. "
-          "Then the "
-          "sensor is blind while a gust carries the vehicle off (black leaves blue); searches (orange) go on "
-          "until one finds it again.",
+          "Then the sensor is blind while a gust carries the vehicle off: what it believes (orange, for it "
+          "searches at every frame) leaves the black line, until a search finds it again.",
       .x = {"east", "m"},
       .y = {"north", "m"},
       .curves = {truth, belief, searched}});
@@ -359,13 +375,16 @@ std::optional<std::string> report(const Results& r) {
   using Verdict = example::KeyFigure::Verdict;
   const auto judged = [](bool good) { return good ? Verdict::good : Verdict::bad; };
   page.figure({"Position RMSE / Cramer-Rao bound", readable(r.straight.rmse_over_bound, 4), "",
-               "straight flight, second half", judged(r.straight.rmse_over_bound <= 1.2)});
+               "straight flight, second half" + interval(r.straight.rmse_over_bound_interval),
+               judged(r.straight.rmse_over_bound <= 1.2)});
   page.figure({"NEES, 5 states", readable(r.straight.nees_mean), "",
                "band " + readable(r.straight.nees_band.low) + " to " + readable(r.straight.nees_band.high),
                judged(r.straight.nees_band.contains(r.straight.nees_mean))});
   if (r.acquisition)
     page.figure({"Acquired within 2 km", readable(100 * r.acquisition->rate), "%",
-                 "at the first frame " + readable(100 * r.acquisition->first_rate) + " %; wrong " +
+                 std::to_string(r.acquisition->trials.size()) + " starts" +
+                     interval(share_interval(r.acquisition->rate, r.acquisition->trials.size()), 100) +
+                     "; at the first frame " + readable(100 * r.acquisition->first_rate) + " %; wrong " +
                      readable(100 * r.acquisition->wrong_rate) + " %",
                  judged(r.acquisition->rate >= 0.95 && r.acquisition->wrong_rate == 0)});
   if (r.planar)

@@ -11,6 +11,7 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/parallel.hpp>
 #include <cairn/core/random.hpp>
+#include <cairn/core/statistics.hpp>
 #include <cairn/field/correlation.hpp>
 #include <cairn/field/field_map.hpp>
 #include <cairn/field/patch_filter.hpp>
@@ -171,6 +172,25 @@ void add_frame(const StraightFlight& flight, const std::vector<Run>& runs, std::
   }
 }
 
+/// 95 % of the ratio of RMSE and bound over the frames from `first`: that of a ratio of means, by the
+/// residuals of the runs (W. Cochran, "Sampling Techniques", 1977, chapter 6).
+cairn::ConsistencyBand ratio_interval(const std::vector<Run>& runs, std::size_t first, double ratio) {
+  if (runs.size() < 2) return {};
+  cairn::RunningMoments residuals, bounds;
+  for (const Run& run : runs) {
+    double squares = 0, bound = 0;
+    for (std::size_t k = first; k < run.error.size(); ++k) {
+      squares += run.error[k](0) * run.error[k](0);
+      bound += run.bound[k](0);
+    }
+    residuals.add(squares - ratio * ratio * bound);
+    bounds.add(bound);
+  }
+  const double reach =
+      1.96 * residuals.standard_deviation() / std::sqrt(static_cast<double>(runs.size())) / bounds.mean();
+  return {std::sqrt(std::max(0.0, ratio * ratio - reach)), std::sqrt(ratio * ratio + reach)};
+}
+
 }  // namespace
 
 StraightResult fly_straight(const StraightFlight& flight, std::size_t runs) {
@@ -196,6 +216,7 @@ StraightResult fly_straight(const StraightFlight& flight, std::size_t runs) {
   }
   const auto half = static_cast<double>(frames - frames / 2);
   result.rmse_over_bound = std::sqrt(squares / bounds);
+  result.rmse_over_bound_interval = ratio_interval(all, frames / 2, result.rmse_over_bound);
   result.rms_position_error = std::sqrt(squares / half);
   result.nees_mean = nees / half;
   result.nees_band = cairn::chi_square_mean_band(5, static_cast<double>(runs));

@@ -45,11 +45,12 @@ struct StraightResult {
   std::array<std::vector<double>, 5> one_run;  ///< the errors of the first run
   std::vector<double> nees;                    ///< mean over the runs, 5 degrees of freedom
   double rmse_over_bound = 0;                  ///< of the position, root mean square over the second half
-  double nees_mean = 0;                        ///< over the second half
-  cairn::ConsistencyBand nees_band{};          ///< 95 %, for as many independent values as there are runs
-  double rms_position_error = 0;               ///< over the second half [m]
-  double max_position_error = 0;               ///< over the second half of all runs [m]
-  std::size_t refused = 0;                     ///< frames that the filter refused
+  cairn::ConsistencyBand rmse_over_bound_interval{};  ///< 95 %, by the spread of the runs; empty for one run
+  double nees_mean = 0;                               ///< over the second half
+  cairn::ConsistencyBand nees_band{};  ///< 95 %, for as many independent values as there are runs
+  double rms_position_error = 0;       ///< over the second half [m]
+  double max_position_error = 0;       ///< over the second half of all runs [m]
+  std::size_t refused = 0;             ///< frames that the filter refused
 };
 
 [[nodiscard]] StraightResult fly_straight(const StraightFlight& flight, std::size_t runs);

@@ -75,7 +75,7 @@ void add_panels(example::Report& report, const Study& study) {
   };
   const std::string per_step = std::to_string(study.stream.step) + " inserted and " +
                                std::to_string(study.stream.queries) + " asked a step";
-  const std::string usual_z = "Forests with n1 = 10 m. ";
+  const std::string usual_z = "Forests with z = 10. ";
   add({title + ": sum", usual_z + per_step + ".", "a step", "ms", 1e3}, true, true, &Curves::sum);
   add({title + ": building", usual_z + "Time of the insertion alone.", "a step", "ms", 1e3}, true, false,
       &Curves::build);
@@ -83,8 +83,7 @@ void add_panels(example::Report& report, const Study& study) {
       &Curves::search);
   add({title + ": worst step so far", usual_z + "The slowest step up to n.", "worst step", "ms", 1e3}, true,
       true, &Curves::worst);
-  add({title + ": size of the first tree", "Sum a step for q = 4 and n1 = m, 10 m, 50 m.", "a step", "ms",
-       1e3},
+  add({title + ": size of the first tree", "Sum a step for q = 4 and z = 1, 10, 50.", "a step", "ms", 1e3},
       false, false, &Curves::sum);
   add({title + ": points moved",
        usual_z + "Points written into trees for each inserted one: no clock is involved.", "moved / inserted",
@@ -173,6 +172,10 @@ example::Report make_report(const std::vector<Study>& studies, const std::string
        .unit = "of " + std::to_string(checked),
        .hint = "against distances summed in double",
        .verdict = wrong == 0 ? example::KeyFigure::Verdict::good : example::KeyFigure::Verdict::bad});
+  report.note(
+      "n: points there are; m: points that one step inserts. A forest's first tree holds n1 = z m points, "
+      "each "
+      "further one q times as many as the one before; full trees are merged into the next.");
   report.note(
       "Times are CPU times of one thread. The single tree and the scan are timed whenever n has grown "
       "by a twentieth; each of these steps stands for those before it. Costs a step are means over the steps "
