@@ -18,7 +18,7 @@
 // again; the heat map says why. A planted bug leaves a map that looks as good: only the NEES turns red.
 //
 // Now change this (answers at the end): (1) --steps 95, just before the loop closes: which ellipses are
-// large? (2) turn_density of the world times ten: what breaks? (3) Gate at 50 % in place of 99.9 %: and now?
+// large? (2) turn_density in support/landmark_world.hpp times ten: what breaks? (3) A gate of 0.5, not 0.999?
 #include <algorithm>
 #include <cmath>
 #include <string>

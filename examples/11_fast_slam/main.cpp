@@ -14,8 +14,8 @@
 // (M. Montemerlo et al., FastSLAM 2.0, IJCAI 2003; S. Thrun et al., Probabilistic Robotics, table 13.3.)
 // Look for: trails fan out; where the loop closes few survive, and all have one past. Resampling forgets: the
 // NEES is good at first, then climbs and stays up (T. Bailey, J. Nieto, E. Nebot, ICRA 2006).
-// Now change this (answers at the end): (1) particles = 10. (2) cairn::FromMotion{} in place of the
-// last `proposal`: FastSLAM 1.0. (3) particles = 400: for how long is the NEES good now?
+// Now change this (answers at the end): (1) particles = 10. (2) step(..., cairn::FromMotion{}, ...) in
+// place of proposal: FastSLAM 1.0. (3) particles = 400: for how long is the NEES good now?
 #include <cmath>
 #include <memory>
 #include <numbers>
@@ -93,8 +93,8 @@ int main(int argc, char** argv) {
   double posts = 0;
   example::PlaneFilm film{"Trails of ten particles, first run", "", {"east", "m"}, {"north", "m"}, {"step"}};
   film.caption = "And the posts of the best. Soon after step 100 the loop closes: see what is left.";
-  const auto proposal = [&](const Map& map, const Gaussian<SE2>& motion, const Sightings& seen,
-                            cairn::Random& random) {
+  [[maybe_unused]] const auto proposal = [&](const Map& map, const Gaussian<SE2>& motion,
+                                             const Sightings& seen, cairn::Random& random) {
     Map::Match q{cairn::no_point, motion, 0};
     double log_weight = 0;
     for (const auto& one : seen) log_weight += (q = map.match(q.pose, one.z)).log_likelihood;
