@@ -11,7 +11,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
-#include <future>
 #include <iostream>
 #include <optional>
 #include <string>
@@ -25,6 +24,7 @@
 #include <cairn/io/file.hpp>
 
 #include "dataset.hpp"
+#include "frames_ahead.hpp"
 #include "outputs.hpp"
 #include "pipeline.hpp"
 #include "run_report.hpp"
@@ -166,9 +166,9 @@ example::Report growing_report(stereo_slam::RunRecord record, std::size_t frames
   return run_report(record, summarise(record));
 }
 
-/// Runs the system over the data set; the next frame is loaded while this one is worked on. A frame that
-/// cannot be read and an interruption end the run early, with what there is until then; throws where that is
-/// nothing.
+/// Runs the system over the data set; the next frames are read and their points found while one is worked on.
+/// A frame that cannot be read and an interruption end the run early, with what there is until then; throws
+/// where that is nothing.
 Run run(const stereo_slam::Dataset& dataset, const Arguments& arguments, example::LivePage* live) {
   using Clock = std::chrono::steady_clock;
   Run result;
@@ -186,26 +186,20 @@ Run run(const stereo_slam::Dataset& dataset, const Arguments& arguments, example
   };
   example::Progress progress(std::cerr, "frames", dataset.size());
   const Clock::time_point start = Clock::now();
-  const auto load = [&](std::size_t i) {
-    const Clock::time_point begin = Clock::now();
-    stereo_slam::StereoFrame frame = dataset.frame(i);
-    return std::pair{std::move(frame),
-                     std::chrono::duration<double, std::milli>(Clock::now() - begin).count()};
-  };
   std::string why;
   const example::Interruption interruption;
   try {
-    auto next = std::async(std::launch::deferred, load, std::size_t{0});
+    stereo_slam::FramesAhead frames(dataset, stereo_slam::feature_options(arguments.pipeline),
+                                    arguments.pipeline.threads);
     for (std::size_t i = 0; i < dataset.size(); ++i) {
       if (const auto signal = interruption.caught()) {
         why = "interrupted (" + *signal + ")";
         result.code = example::exit_interrupted;
         break;
       }
-      auto [frame, load_milliseconds] = next.get();
-      const auto policy = arguments.pipeline.threads > 1 ? std::launch::async : std::launch::deferred;
-      if (i + 1 < dataset.size()) next = std::async(policy, load, i + 1);
-      const stereo_slam::FrameRecord& done = pipeline.step(frame, load_milliseconds);
+      const stereo_slam::FrameAhead next = frames.take();
+      const stereo_slam::FrameRecord& done = pipeline.step(next.frame, next.points, next.load_milliseconds);
+      frames.match_by(pipeline.settled_matcher());
       progress.step(done.tracked
                         ? std::to_string(done.inliers) + " of " + std::to_string(done.stereo_matches) +
                               " points agree, " + std::to_string(done.landmarks) + " landmarks"

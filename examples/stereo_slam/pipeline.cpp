@@ -3,16 +3,16 @@
 #include "pipeline.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <tuple>
 #include <utility>
 
 #include <cairn/core/cholesky.hpp>
-#include <cairn/core/parallel.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/io/text.hpp>
+
+#include "stopwatch.hpp"
 
 namespace stereo_slam {
 namespace {
@@ -20,22 +20,8 @@ namespace {
 /// What the work returns; adds the time it took to a stage of a frame's record.
 template <class Work>
 auto timed(FrameRecord& record, Stage stage, const Work& work) {
-  using Clock = std::chrono::steady_clock;
-  struct Timer {
-    double& milliseconds;
-    Clock::time_point start = Clock::now();
-    ~Timer() { milliseconds += std::chrono::duration<double, std::milli>(Clock::now() - start).count(); }
-  };
-  const Timer timer{record.milliseconds[static_cast<std::size_t>(stage)]};
+  const Stopwatch watch(record.milliseconds[static_cast<std::size_t>(stage)]);
   return work();
-}
-
-FeatureOptions feature_options(const PipelineOptions& options) {
-  return {.kind = options.features,
-          .points = options.points,
-          .surf_threshold = options.surf_threshold,
-          .oriented = options.oriented,
-          .threads = std::max(1U, options.threads / 2)};
 }
 
 StoreOptions store_options(const PipelineOptions& options) {
@@ -59,12 +45,18 @@ cairn::KeyframeMapOptions map_options(const PipelineOptions& options) {
 
 }  // namespace
 
+FeatureOptions feature_options(const PipelineOptions& options) {
+  return {.kind = options.features,
+          .points = options.points,
+          .surf_threshold = options.surf_threshold,
+          .oriented = options.oriented};
+}
+
 Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options)
     : options_(options),
       rig_(rig),
-      extract_left_(make_extractor(feature_options(options))),
-      extract_right_(make_extractor(feature_options(options))),
-      match_stereo_(rig, options.stereo),
+      front_end_(feature_options(options), options.threads),
+      match_stereo_(std::make_shared<const StereoMatcher>(rig, options.stereo)),
       triangulate_(rig, triangulation_options(options, rig)),
       calibration_(rig, options.calibration),
       store_(make_landmark_store(store_options(options))),
@@ -107,23 +99,47 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options, 
 }
 
 const FrameRecord& Pipeline::step(const StereoFrame& frame, double load_milliseconds) {
-  record_.frames.emplace_back();
+  return step(frame, front_end_(frame, match_stereo_), load_milliseconds);
+}
+
+const FrameRecord& Pipeline::step(const StereoFrame& frame, const FramePoints& points,
+                                  double load_milliseconds) {
+  FrameRecord& result = record_.frames.emplace_back();
+  const auto of = [&](Stage stage) -> double& {
+    return result.milliseconds[static_cast<std::size_t>(stage)];
+  };
+  of(Stage::load) = load_milliseconds;
+  of(Stage::detect) = points.detect_milliseconds;
+  of(Stage::stereo) = points.stereo_milliseconds;
+  of(Stage::total) = points.detect_milliseconds + points.stereo_milliseconds;
   try {
-    return work_on(frame, load_milliseconds);
+    work_on(frame, points, result);
   } catch (...) {
     record_.frames.pop_back();  // the record holds whole frames
     throw;
   }
+  return result;
 }
 
-const FrameRecord& Pipeline::work_on(const StereoFrame& frame, double load_milliseconds) {
-  FrameRecord& result = record_.frames.back();
+std::shared_ptr<const StereoMatcher> Pipeline::settled_matcher() const {
+  return corrects_rig() ? nullptr : match_stereo_;
+}
+
+/// Whether the rig is or may yet come to be another than it is now.
+bool Pipeline::corrects_rig() const {
+  if (options_.calibrate == Calibration::drifting) return true;
+  if (map_.empty()) return options_.calibrate != Calibration::off;
+  return map_.rig_correction().has_value();
+}
+
+void Pipeline::work_on(const StereoFrame& frame, const FramePoints& points, FrameRecord& result) {
   result.index = frame.index;
   result.time = frame.time;
-  result.milliseconds[static_cast<std::size_t>(Stage::load)] = load_milliseconds;
+  left_ = &points.left;
   timed(result, Stage::total, [&] {
-    timed(result, Stage::detect, [&] { detect(frame); });
-    timed(result, Stage::stereo, [&] { find_local_landmarks(frame); });
+    timed(result, Stage::stereo, [&] {
+      find_local_landmarks(points.matched_by == match_stereo_ ? points.pairs : pairs_of(frame, points));
+    });
     constexpr double usual = 0.1;  // [s], where the clock of a recording stands still
     const double dt = time_ ? frame.time - *time_ : usual;
     motion_.predict(dt > 0 && std::isfinite(dt) ? dt : usual);
@@ -137,8 +153,8 @@ const FrameRecord& Pipeline::work_on(const StereoFrame& frame, double load_milli
     if (!T_truth_world_) T_truth_world_ = *frame.truth * T_world_camera_.inverse();
     result.truth = T_truth_world_->inverse() * *frame.truth;
   }
-  result.points_left = static_cast<int>(left_->size());
-  result.points_right = static_cast<int>(right_->size());
+  result.points_left = static_cast<int>(points.left.size());
+  result.points_right = static_cast<int>(points.right.size());
   result.stereo_matches = static_cast<int>(locals_.size());
   result.T_world_camera = T_world_camera_;
   result.covariance = pose_covariance_;
@@ -149,7 +165,6 @@ const FrameRecord& Pipeline::work_on(const StereoFrame& frame, double load_milli
     result.T_world_reference = map_.keyframe_pose(result.reference).value_or(cairn::SE3());
   }
   ++step_;
-  return result;
 }
 
 /// The first frame that shows enough is where the world begins.
@@ -252,18 +267,12 @@ bool Pipeline::believes(const cairn::MapLocation& here) {
   return true;
 }
 
-/// Interest points of both images, one thread each.
-void Pipeline::detect(const StereoFrame& frame) {
-  cairn::parallel_for(2, options_.threads, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t side = begin; side < end; ++side)
-      (side == 0 ? left_ : right_) = side == 0 ? &extract_left_(frame.left) : &extract_right_(frame.right);
-  });
+std::vector<PointPair> Pipeline::pairs_of(const StereoFrame& frame, const FramePoints& points) const {
+  return (*match_stereo_)(frame.left, points.left, frame.right, points.right, options_.threads);
 }
 
 /// The stereo pairs that make points in space.
-void Pipeline::find_local_landmarks(const StereoFrame& frame) {
-  const std::vector<PointPair> pairs =
-      match_stereo_(frame.left, *left_, frame.right, *right_, options_.threads);
+void Pipeline::find_local_landmarks(std::span<const PointPair> pairs) {
   locals_.clear();
   for (const PointPair& pair : pairs) {
     const double scale = left_->keypoints[pair.left].scale;
@@ -569,7 +578,7 @@ void Pipeline::take_rig(const cairn::StereoRig& rig) {
 void Pipeline::look_through(const cairn::StereoRig& rig) {
   rig_ = rig;
   triangulate_ = cairn::Triangulator(rig, triangulation_options(options_, rig));
-  match_stereo_ = StereoMatcher(rig, options_.stereo);
+  match_stereo_ = std::make_shared<const StereoMatcher>(rig, options_.stereo);
 }
 
 void Pipeline::earliest_first(std::vector<Match>& matches) const {

@@ -31,6 +31,7 @@
 
 #include "dataset.hpp"
 #include "feature_choice.hpp"
+#include "front_end.hpp"
 #include "guided_matching.hpp"
 #include "landmark_store.hpp"
 #include "landmarks.hpp"
@@ -98,6 +99,9 @@ struct PipelineOptions {
   bool localise = false;         ///< a loaded map stays as it is: no keyframe, no landmark more
 };
 
+/// The interest points that a pipeline with these options works on.
+[[nodiscard]] FeatureOptions feature_options(const PipelineOptions& options);
+
 /// The system. Feed it frames in order; then ask for the record.
 class Pipeline {
 public:
@@ -111,6 +115,12 @@ public:
   /// Works on one frame; `load_milliseconds` is what reading it took. Returns what came of it. Where that
   /// throws the record is of the frames before.
   const FrameRecord& step(const StereoFrame& frame, double load_milliseconds = 0);
+  /// The same for a frame whose points a front end with feature_options() found; pairs by another matcher
+  /// than the rig's as it is now are not looked at.
+  const FrameRecord& step(const StereoFrame& frame, const FramePoints& points, double load_milliseconds = 0);
+
+  /// What finds the stereo pairs of all frames to come; nullptr while the rig may still be corrected.
+  [[nodiscard]] std::shared_ptr<const StereoMatcher> settled_matcher() const;
 
   /// Everything that happened, with the map as it stands now.
   [[nodiscard]] RunRecord record();
@@ -138,9 +148,10 @@ private:
     std::vector<Match> agreed;
   };
 
-  const FrameRecord& work_on(const StereoFrame& frame, double load_milliseconds);
-  void detect(const StereoFrame& frame);
-  void find_local_landmarks(const StereoFrame& frame);
+  void work_on(const StereoFrame& frame, const FramePoints& points, FrameRecord& result);
+  [[nodiscard]] bool corrects_rig() const;
+  [[nodiscard]] std::vector<PointPair> pairs_of(const StereoFrame& frame, const FramePoints& points) const;
+  void find_local_landmarks(std::span<const PointPair> pairs);
   [[nodiscard]] std::vector<Match> match_with_map() const;
   /// Leaves of `matches` what can be where the motion leads, and adds what the second look finds.
   [[nodiscard]] std::optional<Located> locate(std::vector<Match>& matches);
@@ -177,10 +188,9 @@ private:
 
   PipelineOptions options_;
   cairn::StereoRig rig_;
-  Extractor extract_left_, extract_right_;
-  const cairn::Features* left_ = nullptr;  // of the current frame; they live in the extractors
-  const cairn::Features* right_ = nullptr;
-  StereoMatcher match_stereo_;
+  FrontEnd front_end_;
+  const cairn::Features* left_ = nullptr;  // of the frame that is worked on
+  std::shared_ptr<const StereoMatcher> match_stereo_;
   cairn::Triangulator triangulate_;
   SelfCalibration calibration_;
   std::unique_ptr<LandmarkStore> store_;
