@@ -10,12 +10,9 @@
 namespace stereo_slam {
 namespace {
 
-constexpr unsigned most_threads = 4;
-
 std::vector<FrontEnd> one_a_thread(const FeatureOptions& features, unsigned threads) {
   std::vector<FrontEnd> front_ends;
-  for (unsigned thread = 0; thread < std::clamp(threads, 1U, most_threads); ++thread)
-    front_ends.emplace_back(features, 1);
+  for (unsigned thread = 0; thread < threads_ahead(threads); ++thread) front_ends.emplace_back(features, 1);
   return front_ends;
 }
 
@@ -24,13 +21,18 @@ std::vector<FrontEnd> one_a_thread(const FeatureOptions& features, unsigned thre
 FramesAhead::FramesAhead(const Dataset& dataset, const FeatureOptions& features, unsigned threads)
     : dataset_(dataset),
       front_ends_(one_a_thread(features, threads)),
-      ahead_(dataset.size(), static_cast<unsigned>(front_ends_.size()),
-             front_ends_.size() > 1 ? 2 * front_ends_.size() : 1,
+      points_(features.points),
+      ahead_(dataset.size(), threads_ahead(threads), front_ends_.size() > 1 ? 2 * front_ends_.size() : 1,
              [this](std::size_t i, unsigned thread) { return make(i, thread); }) {}
 
 void FramesAhead::match_by(std::shared_ptr<const StereoMatcher> matcher) {
   const std::lock_guard lock(mutex_);
   matcher_ = std::move(matcher);
+}
+
+void FramesAhead::keep(int points) {
+  const std::lock_guard lock(mutex_);
+  points_ = points;
 }
 
 FrameAhead FramesAhead::make(std::size_t i, unsigned thread) {
@@ -41,6 +43,7 @@ FrameAhead FramesAhead::make(std::size_t i, unsigned thread) {
   }
   std::unique_lock lock(mutex_);
   std::shared_ptr<const StereoMatcher> matcher = matcher_;
+  front_ends_[thread].keep(points_);
   lock.unlock();
   made.points = front_ends_[thread](made.frame, std::move(matcher));
   return made;

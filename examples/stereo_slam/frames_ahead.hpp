@@ -10,6 +10,7 @@
 /// rig that is being corrected decides which points are pairs, so there they are left to the pipeline.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <memory>
 #include <mutex>
@@ -28,9 +29,19 @@ struct FrameAhead {
   FramePoints points;
 };
 
-/// One thread takes; up to `threads` work in all, and the frames are the same for every number of them. The
-/// work on a frame before the cut is about as much as that behind it, which one thread does: more than four
-/// threads would wait for it, and no more are used. At most eight frames are in memory.
+/// So many of a run's threads work on frames ahead, the one that takes among them. The work on a frame before
+/// the cut is about as much as that behind it: more than four would wait for the pipeline.
+[[nodiscard]] constexpr unsigned threads_ahead(unsigned threads) noexcept {
+  return std::clamp(threads, 1U, 4U);
+}
+
+/// So many are left to the work on one frame behind the cut.
+[[nodiscard]] constexpr unsigned threads_behind(unsigned threads) noexcept {
+  return std::max(threads, 1U) - threads_ahead(threads) + 1;
+}
+
+/// One thread takes. The frames are the same for every number of `threads`, which are those of the whole run.
+/// At most twice as many frames are in memory as threads work ahead.
 class FramesAhead {
 public:
   /// The data set has to outlive it.
@@ -41,6 +52,9 @@ public:
 
   /// From now on the pairs are found as well, by this matcher (nullptr: not).
   void match_by(std::shared_ptr<const StereoMatcher> matcher);
+  /// From now on so many points are kept in an image. In frames that are under way it is as before: with more
+  /// than one thread it depends on the clock which frame is the first.
+  void keep(int points);
 
 private:
   [[nodiscard]] FrameAhead make(std::size_t i, unsigned thread);
@@ -48,8 +62,9 @@ private:
   const Dataset& dataset_;
   std::vector<FrontEnd> front_ends_;  // one a thread
   std::mutex mutex_;
-  std::shared_ptr<const StereoMatcher> matcher_;  // under the mutex
-  example::Ahead<FrameAhead> ahead_;              // the last member: its threads use the others
+  std::shared_ptr<const StereoMatcher> matcher_;  // under the mutex, as the next
+  int points_;
+  example::Ahead<FrameAhead> ahead_;  // the last member: its threads use the others
 };
 
 }  // namespace stereo_slam

@@ -21,12 +21,21 @@ FeatureOptions of_one_side(FeatureOptions features, unsigned threads) {
 }  // namespace
 
 FrontEnd::FrontEnd(const FeatureOptions& features, unsigned threads)
-    : threads_(threads),
-      left_(make_extractor(of_one_side(features, threads))),
-      right_(make_extractor(of_one_side(features, threads))) {}
+    : features_(of_one_side(features, threads)),
+      threads_(threads),
+      left_(make_extractor(features_)),
+      right_(make_extractor(features_)) {}
+
+void FrontEnd::keep(int points) {
+  if (points == features_.points) return;
+  features_.points = points;
+  left_ = make_extractor(features_);
+  right_ = make_extractor(features_);
+}
 
 FramePoints FrontEnd::operator()(const StereoFrame& frame, std::shared_ptr<const StereoMatcher> matcher) {
   FramePoints points;
+  points.wanted = features_.points;
   {
     const Stopwatch watch(points.detect_milliseconds);
     cairn::parallel_for(2, threads_, [&](std::size_t begin, std::size_t end) {

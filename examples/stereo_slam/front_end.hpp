@@ -23,6 +23,7 @@ namespace stereo_slam {
 /// The points of one frame.
 struct FramePoints {
   cairn::Features left, right;
+  int wanted = 0;  ///< as many as were looked for in an image
   /// Where matched_by is there: the pairs that it found.
   std::vector<PointPair> pairs;
   std::shared_ptr<const StereoMatcher> matched_by;
@@ -38,11 +39,16 @@ public:
   FrontEnd(FrontEnd&&) = default;
   FrontEnd& operator=(FrontEnd&&) = default;
 
+  /// From now on so many points are kept in an image, the strongest. The points do not depend on what was
+  /// kept before. Where the number changes the extractors are made anew.
+  void keep(int points);
+
   /// The points of a frame; their pairs where there is a matcher.
   [[nodiscard]] FramePoints operator()(const StereoFrame& frame,
                                        std::shared_ptr<const StereoMatcher> matcher = nullptr);
 
 private:
+  FeatureOptions features_;  // of one image
   unsigned threads_;
   Extractor left_, right_;
 };

@@ -61,12 +61,14 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options)
       calibration_(rig, options.calibration),
       store_(make_landmark_store(store_options(options))),
       map_(rig, map_options(options)),
+      budget_(options.budget, options.points),
       motion_(options.motion),
       loop_watch_(options.loops),
       pose_covariance_(cairn::Matrix<6>::Zero()) {
   record_.seed = options.seed;
   record_.threads = options.threads;
   record_.target_points = options.points;
+  record_.budget = options.budget.milliseconds;
   record_.features = feature_names[static_cast<std::size_t>(options.features)];
   record_.store = options.store.kind == StoreKind::multi ? "multi" : "single";
   record_.motion = motion_names[static_cast<std::size_t>(options.motion.filter)];
@@ -99,6 +101,7 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options, 
 }
 
 const FrameRecord& Pipeline::step(const StereoFrame& frame, double load_milliseconds) {
+  front_end_.keep(budget_.points());
   return step(frame, front_end_(frame, match_stereo_), load_milliseconds);
 }
 
@@ -111,14 +114,35 @@ const FrameRecord& Pipeline::step(const StereoFrame& frame, const FramePoints& p
   of(Stage::load) = load_milliseconds;
   of(Stage::detect) = points.detect_milliseconds;
   of(Stage::stereo) = points.stereo_milliseconds;
-  of(Stage::total) = points.detect_milliseconds + points.stereo_milliseconds;
+  of(Stage::total) = ahead_ = points.detect_milliseconds + points.stereo_milliseconds;
+  begun_ = std::chrono::steady_clock::now();
   try {
     work_on(frame, points, result);
   } catch (...) {
     record_.frames.pop_back();  // the record holds whole frames
     throw;
   }
+  result.points_wanted = points.wanted;
+  result.shed = budget_.finish(result.points_left, points.wanted, of(Stage::total));
   return result;
+}
+
+/// Work on this frame so far. [ms]
+double Pipeline::spent() const {
+  return ahead_ +
+         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begun_).count();
+}
+
+/// Does work that a frame can do without, where its budget has time for it.
+template <class Work>
+void Pipeline::if_time(Shed kind, const Work& work, bool always) {
+  if (!always && !budget_.allows(kind, spent())) return;
+  double milliseconds = 0;
+  {
+    const Stopwatch watch(milliseconds);
+    work();
+  }
+  budget_.took(kind, milliseconds);
 }
 
 std::shared_ptr<const StereoMatcher> Pipeline::settled_matcher() const {
@@ -234,10 +258,10 @@ void Pipeline::follow(const StereoFrame& frame, FrameRecord& result) {
   result.inliers = static_cast<int>(located->agreed.size());
   note_loop(*located);
   move_to(*located, result);
-  if (!options_.localise && wants_keyframe(located->agreed.size()))
-    timed(result, Stage::update, [&] { make_keyframe(*located, frame, result); });
+  if (!options_.localise)
+    timed(result, Stage::update, [&] { make_keyframe_if_due(*located, frame, result); });
   timed(result, Stage::store, [&] {
-    if (!options_.localise) age(*located);
+    if (!options_.localise) if_time(Shed::tidying, [&] { age(*located); });
     close_step();
   });
   if (options_.calibrate == Calibration::drifting)
@@ -318,7 +342,8 @@ std::optional<Pipeline::Located> Pipeline::locate(std::vector<Match>& matches) {
   }
   matches = std::move(near);
   if (!pose.good()) return std::nullopt;
-  look_again(pose, matches);
+  expected_.clear();
+  if_time(Shed::second_look, [&] { look_again(pose, matches); });
   Located located;
   located.sightings = sightings(matches);
   located.location = map_.locate(pose.T_world_camera, located.sightings);
@@ -377,7 +402,6 @@ void Pipeline::look_again(const cairn::StereoPose& pose, std::vector<Match>& mat
                         locals_[i].left_pixel,
                         locals_[i].right_pixel,
                         {left_->descriptor(locals_[i].point), left_->keypoints[locals_[i].point].laplacian}});
-  expected_.clear();
   for (const LandmarkId id : map_.seen_with(in_play)) {
     if (std::ranges::binary_search(known, id)) continue;
     const Landmark& landmark = landmarks_[id];
@@ -407,17 +431,22 @@ void Pipeline::move_to(const Located& located, FrameRecord& result) {
   }
 }
 
-/// Whether much less of what is seen is known than was at best since the last keyframe.
-bool Pipeline::wants_keyframe(std::size_t agreed) {
-  const double share = static_cast<double>(agreed) / static_cast<double>(locals_.size());
+/// A keyframe is due when much less of what is seen is known than was at best since the last one, and can be
+/// put off until it is as much less again.
+void Pipeline::make_keyframe_if_due(const Located& located, const StereoFrame& frame, FrameRecord& result) {
+  const double share = static_cast<double>(located.agreed.size()) / static_cast<double>(locals_.size());
   best_share_ = std::max(best_share_, share);
-  return share < options_.keyframe_share * best_share_;
+  const double due = options_.keyframe_share * best_share_;
+  if (share < due)
+    if_time(
+        Shed::keyframe, [&] { make_keyframe(located, frame, result); },
+        share < options_.keyframe_share * due);
 }
 
 void Pipeline::make_keyframe(const Located& located, const StereoFrame& frame, FrameRecord& result) {
   if (!map_.add_keyframe(located.location, located.sightings)) return;
   if (map_.rig_correction()) look_through(map_.rig());
-  merge_twins(located);
+  if_time(Shed::tidying, [&] { merge_twins(located); });
   add_landmarks(located.agreed, frame);
   result.keyframe = true;
   best_share_ = 0;
@@ -489,10 +518,12 @@ void Pipeline::note_loop(const Located& located) {
       others.push_back(sighting(match.local, match.landmark));
   }
   if (!loop_watch_.observe(step_, away) || lost_) return;
-  const cairn::MapLocation before = map_.locate(located.location.T_world_camera, others);
   LoopClosure loop{record_.frames.size() - 1, back.size(), 0, std::nullopt};
   loop.away = static_cast<int>(cairn::median(std::move(back)));
-  if (before.good()) loop.T_world_before = before.T_world_camera;
+  if_time(Shed::tidying, [&] {
+    const cairn::MapLocation before = map_.locate(located.location.T_world_camera, others);
+    if (before.good()) loop.T_world_before = before.T_world_camera;
+  });
   record_.loops.push_back(loop);
 }
 

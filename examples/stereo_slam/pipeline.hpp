@@ -14,6 +14,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -31,6 +32,7 @@
 
 #include "dataset.hpp"
 #include "feature_choice.hpp"
+#include "frame_budget.hpp"
 #include "front_end.hpp"
 #include "guided_matching.hpp"
 #include "landmark_store.hpp"
@@ -76,6 +78,7 @@ struct PipelineOptions {
 
   double pixel_sigma = 0.35;     ///< noise of the coordinates of a point of scale 1 [pixels]
   double scale_exponent = 0.65;  ///< it grows with this power of the scale
+  FrameBudgetOptions budget;     ///< of the work on a frame; what it leaves out depends on the clock
   GuidedMatchingOptions second_look;
   std::size_t min_inliers = 10;         ///< fewer: the frame is lost
   std::size_t relocating_inliers = 25;  ///< fewer: a camera that is lost stays so
@@ -122,6 +125,9 @@ public:
   /// What finds the stereo pairs of all frames to come; nullptr while the rig may still be corrected.
   [[nodiscard]] std::shared_ptr<const StereoMatcher> settled_matcher() const;
 
+  /// Points that an image of the next frames should have, to keep within the budget.
+  [[nodiscard]] int wanted_points() const noexcept { return budget_.points(); }
+
   /// Everything that happened, with the map as it stands now.
   [[nodiscard]] RunRecord record();
 
@@ -149,6 +155,9 @@ private:
   };
 
   void work_on(const StereoFrame& frame, const FramePoints& points, FrameRecord& result);
+  [[nodiscard]] double spent() const;
+  template <class Work>
+  void if_time(Shed kind, const Work& work, bool always = false);
   [[nodiscard]] bool corrects_rig() const;
   [[nodiscard]] std::vector<PointPair> pairs_of(const StereoFrame& frame, const FramePoints& points) const;
   void find_local_landmarks(std::span<const PointPair> pairs);
@@ -162,7 +171,7 @@ private:
   void follow(const StereoFrame& frame, FrameRecord& result);
   void lose(const StereoFrame& frame, const std::string& why, FrameRecord& result);
   void move_to(const Located& located, FrameRecord& result);
-  [[nodiscard]] bool wants_keyframe(std::size_t agreed);
+  void make_keyframe_if_due(const Located& located, const StereoFrame& frame, FrameRecord& result);
   void make_keyframe(const Located& located, const StereoFrame& frame, FrameRecord& result);
   void add_landmarks(const std::vector<Match>& known, const StereoFrame& frame);
   void close_step();
@@ -197,6 +206,9 @@ private:
   Landmarks landmarks_;
   cairn::KeyframeMap map_;
   NoiseFactors noise_factors_;
+  FrameBudget budget_;
+  std::chrono::steady_clock::time_point begun_;  // work on the frame, here
+  double ahead_ = 0;                             // work on it before [ms]
   PoseFilter motion_;
   std::optional<double> time_;  // of the frame before [s]
   LoopWatch loop_watch_;
