@@ -16,7 +16,6 @@
 #include "arena_dataset.hpp"
 #include "recording.hpp"
 #include "support/image_io.hpp"
-#include "support/rig_file.hpp"
 
 namespace stereo_slam {
 namespace {
@@ -38,16 +37,16 @@ std::string projection(const char* label, const cairn::PinholeCamera& camera, do
 
 std::unique_ptr<Dataset> open_dataset(const DatasetOptions& options) {
   if (options.kind == "arena") {
-    if (!options.camera.empty())
+    if (options.rig)
       cairn::raise("the arena is rendered with a rig of its own; expected a recorded data set with --camera");
     return open_arena(options.arena, options.frames, options.threads);
   }
   const auto with_rig = [&](Recording recording) {
-    if (!options.camera.empty()) recording.rig = example::read_rig(options.camera).rig;
+    if (options.rig) recording.rig = *options.rig;
     return play(std::move(recording), options.frames);
   };
   if (options.kind == "images") {
-    if (options.camera.empty()) cairn::raise("images need a rig; expected one with --camera (rig.yaml)");
+    if (!options.rig) cairn::raise("images need a rig; expected one with --camera (rig.yaml)");
     return with_rig(read_images({options.left, options.right, options.rate}));
   }
   using Reader = Recording (*)(const std::filesystem::path&);

@@ -51,14 +51,13 @@ public:
 };
 
 struct DatasetOptions {
-  std::string kind = "arena";    ///< arena, kitti_odometry, kitti_raw, euroc or images
-  std::filesystem::path folder;  ///< of a recorded data set
-  std::filesystem::path
-      camera;  ///< the rig (support/rig_file.hpp): of `images`; otherwise instead of the recording's
-  std::string left, right;     ///< patterns for the names of the images, kind `images`
-  std::optional<double> rate;  ///< their frames a second; nothing: as the names say
-  std::size_t frames = 0;      ///< only so many; 0 = all
-  unsigned threads = 1;        ///< for rendering
+  std::string kind = "arena";           ///< arena, kitti_odometry, kitti_raw, euroc or images
+  std::filesystem::path folder;         ///< of a recorded data set
+  std::optional<cairn::StereoRig> rig;  ///< of `images`; otherwise instead of the recording's
+  std::string left, right;              ///< patterns for the names of the images, kind `images`
+  std::optional<double> rate;           ///< their frames a second; nothing: as the names say
+  std::size_t frames = 0;               ///< only so many; 0 = all
+  unsigned threads = 1;                 ///< for rendering
   ArenaOptions arena;
 };
 

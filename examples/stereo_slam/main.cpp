@@ -11,7 +11,6 @@
 #include <cstdint>
 #include <cstdio>
 #include <filesystem>
-#include <future>
 #include <iostream>
 #include <optional>
 #include <string>
@@ -25,6 +24,7 @@
 #include <cairn/io/file.hpp>
 
 #include "dataset.hpp"
+#include "frames_ahead.hpp"
 #include "outputs.hpp"
 #include "pipeline.hpp"
 #include "run_report.hpp"
@@ -43,11 +43,12 @@ struct Arguments {
   stereo_slam::DatasetOptions dataset;
   stereo_slam::PipelineOptions pipeline;
   std::filesystem::path out = "stereo_slam_out";
-  std::filesystem::path dump, map, save_map, save_rig;
+  std::filesystem::path camera, dump, map, save_map, save_rig;
   bool there_and_back = false;
   std::optional<std::uint16_t> live;
   std::string store = "multi";
   std::string features = "surf";
+  unsigned threads = std::max(1U, std::thread::hardware_concurrency());
   std::string calibrate = "auto";
   std::string motion = "off";
 };
@@ -73,7 +74,7 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
       ->type_name("KIND [DIR]")
       ->default_str("arena");
   CLI::Option* const camera =
-      app.add_option("--camera", arguments.dataset.camera,
+      app.add_option("--camera", arguments.camera,
                      "the stereo rig (rig.yaml, of cairn or of OpenCV): of --left and --right, or instead of "
                      "the recording's own")
           ->type_name("FILE");
@@ -98,7 +99,7 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
                  "of the arena and of all random draws; same seed, same bytes")
       ->check(example::whole_number(0))
       ->capture_default_str();
-  app.add_option("--threads", arguments.pipeline.threads, "threads; the results do not depend on it")
+  app.add_option("--threads", arguments.threads, "threads; the results do not depend on it")
       ->check(example::whole_number(1, 1024))
       ->capture_default_str();
   app.add_option("--store", arguments.store,
@@ -108,6 +109,13 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
   app.add_option("--points", arguments.pipeline.points, "interest points to keep in an image")
       ->check(example::whole_number(50, 20000))
       ->capture_default_str();
+  app.add_option_function<double>(
+         "--budget", [&](double milliseconds) { arguments.pipeline.budget.milliseconds = milliseconds; },
+         "keep the work on a frame (all but reading it) near MS milliseconds: where that is too little, less "
+         "is done, what is\nmissed least first, and summary.json and the report say what was left out. The "
+         "results then depend on how fast this\nmachine is; without it they do not")
+      ->check(example::number_between(0.01, 1e6))
+      ->type_name("MS");
   app.add_flag("--oriented", arguments.pipeline.oriented,
                "oriented SURF, for cameras that roll (default: upright)");
   app.add_option("--calibrate", arguments.calibrate,
@@ -166,9 +174,9 @@ example::Report growing_report(stereo_slam::RunRecord record, std::size_t frames
   return run_report(record, summarise(record));
 }
 
-/// Runs the system over the data set; the next frame is loaded while this one is worked on. A frame that
-/// cannot be read and an interruption end the run early, with what there is until then; throws where that is
-/// nothing.
+/// Runs the system over the data set; the next frames are read and their points found while one is worked on.
+/// A frame that cannot be read and an interruption end the run early, with what there is until then; throws
+/// where that is nothing.
 Run run(const stereo_slam::Dataset& dataset, const Arguments& arguments, example::LivePage* live) {
   using Clock = std::chrono::steady_clock;
   Run result;
@@ -180,32 +188,28 @@ Run run(const stereo_slam::Dataset& dataset, const Arguments& arguments, example
   const auto record_so_far = [&] {
     stereo_slam::RunRecord record = pipeline.record();
     record.dataset = dataset.name();
+    record.threads = arguments.threads;
     const std::vector<std::string> notes = dataset.notes();
     record.notes.insert(record.notes.begin(), notes.begin(), notes.end());
     return record;
   };
   example::Progress progress(std::cerr, "frames", dataset.size());
   const Clock::time_point start = Clock::now();
-  const auto load = [&](std::size_t i) {
-    const Clock::time_point begin = Clock::now();
-    stereo_slam::StereoFrame frame = dataset.frame(i);
-    return std::pair{std::move(frame),
-                     std::chrono::duration<double, std::milli>(Clock::now() - begin).count()};
-  };
   std::string why;
   const example::Interruption interruption;
   try {
-    auto next = std::async(std::launch::deferred, load, std::size_t{0});
+    stereo_slam::FramesAhead frames(dataset, stereo_slam::feature_options(arguments.pipeline),
+                                    arguments.threads);
     for (std::size_t i = 0; i < dataset.size(); ++i) {
       if (const auto signal = interruption.caught()) {
         why = "interrupted (" + *signal + ")";
         result.code = example::exit_interrupted;
         break;
       }
-      auto [frame, load_milliseconds] = next.get();
-      const auto policy = arguments.pipeline.threads > 1 ? std::launch::async : std::launch::deferred;
-      if (i + 1 < dataset.size()) next = std::async(policy, load, i + 1);
-      const stereo_slam::FrameRecord& done = pipeline.step(frame, load_milliseconds);
+      const stereo_slam::FrameAhead next = frames.take();
+      const stereo_slam::FrameRecord& done = pipeline.step(next.frame, next.points, next.load_milliseconds);
+      frames.match_by(pipeline.settled_matcher());
+      frames.keep(pipeline.wanted_points());
       progress.step(done.tracked
                         ? std::to_string(done.inliers) + " of " + std::to_string(done.stereo_matches) +
                               " points agree, " + std::to_string(done.landmarks) + " landmarks"
@@ -236,6 +240,7 @@ void print_summary(const stereo_slam::RunRecord& record) {
   std::printf("%s: %zu frames, %zu lost, %.1f s, %.1f frames a second, %zu landmarks\n",
               record.dataset.c_str(), summary.frames, summary.frames_lost, timing.seconds, timing.hz,
               summary.landmarks);
+  if (summary.budget) std::printf("%s\n", stereo_slam::budget_text(*summary.budget).c_str());
   if (!summary.errors) return;
   std::printf("path %.2f m, error at the end %.3f m, largest %.3f m and %.2f degrees\n", summary.path,
               summary.errors->end, summary.errors->largest.position,
@@ -257,14 +262,15 @@ int main(int argc, char** argv) {
       "with "
       "one joint covariance.");
   Arguments arguments;
-  arguments.pipeline.threads = std::max(1U, std::thread::hardware_concurrency());
   std::vector<std::string> dataset{"arena"};
   define(app, arguments, dataset);
   if (const std::optional<int> code = example::parse(app, "stereo_slam", argc, argv)) return *code;
   try {
     arguments.dataset.kind = arguments.dataset.left.empty() ? dataset.front() : "images";
     if (dataset.size() > 1) arguments.dataset.folder = dataset[1];
-    arguments.dataset.threads = arguments.pipeline.threads;
+    arguments.pipeline.threads = stereo_slam::threads_behind(arguments.threads);
+    arguments.dataset.threads = arguments.threads;
+    if (arguments.dump.empty()) arguments.dataset.threads /= stereo_slam::threads_ahead(arguments.threads);
     arguments.dataset.arena.seed = arguments.pipeline.seed;
     arguments.pipeline.store.kind =
         arguments.store == "multi" ? stereo_slam::StoreKind::multi : stereo_slam::StoreKind::single;
@@ -274,20 +280,22 @@ int main(int argc, char** argv) {
         choice_of<stereo_slam::Calibration>(stereo_slam::calibration_names, arguments.calibrate);
     arguments.pipeline.motion.filter =
         choice_of<stereo_slam::Motion>(stereo_slam::motion_names, arguments.motion);
+    std::optional<example::CalibratedRig> given;
+    if (!arguments.camera.empty()) {
+      given = example::read_rig(arguments.camera);
+      arguments.dataset.rig = given->rig;
+    }
     auto frames = stereo_slam::open_dataset(arguments.dataset);
     if (arguments.there_and_back) frames = stereo_slam::there_and_back(std::move(frames));
     if (!arguments.dump.empty()) {
       stereo_slam::write_kitti_sequence(*frames, arguments.dump);
       return 0;
     }
-    example::CalibratedRig given{frames->rig(), {}, {}, {}, {}, {}};
-    if (!arguments.dataset.camera.empty()) {
-      given = example::read_rig(arguments.dataset.camera);
-      given.rig = frames->rig();  // which knows the size of its images
+    if (given) {
       // What was calibrated well may have come loose since: never surer than by default.
       cairn::RigSigmas& rig = arguments.pipeline.rig;
-      rig.rotation = std::max(rig.rotation, given.angle_sigma().value_or(0));
-      rig.direction = std::max(rig.direction, given.angle_sigma().value_or(0));
+      rig.rotation = std::max(rig.rotation, given->angle_sigma().value_or(0));
+      rig.direction = std::max(rig.direction, given->angle_sigma().value_or(0));
     }
     stereo_slam::prepare_output_folder(arguments.out);
     arguments.pipeline.sample_frame = frames->size() / 2;
@@ -300,8 +308,11 @@ int main(int argc, char** argv) {
     const Run done = run(*frames, arguments, live ? &*live : nullptr);
     if (done.record.ended_early) std::cerr << "stereo_slam: " << *done.record.ended_early << '\n';
     if (done.record.frames.empty()) return done.code;  // the results of an earlier run stay
-    if (!arguments.save_rig.empty())
-      example::write_rig(arguments.save_rig, stereo_slam::learned_rig(given, done.record));
+    if (!arguments.save_rig.empty()) {
+      if (!given) given.emplace();
+      given->rig = frames->rig();  // which knows the size of its images
+      example::write_rig(arguments.save_rig, stereo_slam::learned_rig(*given, done.record));
+    }
     const std::optional<std::string> no_report = stereo_slam::write_outputs(done.record, arguments.out);
     if (live && !no_report) live->finish(cairn::read_file(arguments.out / "report.html"));
     print_summary(done.record);

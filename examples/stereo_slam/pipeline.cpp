@@ -3,16 +3,16 @@
 #include "pipeline.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <tuple>
 #include <utility>
 
 #include <cairn/core/cholesky.hpp>
-#include <cairn/core/parallel.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/io/text.hpp>
+
+#include "stopwatch.hpp"
 
 namespace stereo_slam {
 namespace {
@@ -20,22 +20,8 @@ namespace {
 /// What the work returns; adds the time it took to a stage of a frame's record.
 template <class Work>
 auto timed(FrameRecord& record, Stage stage, const Work& work) {
-  using Clock = std::chrono::steady_clock;
-  struct Timer {
-    double& milliseconds;
-    Clock::time_point start = Clock::now();
-    ~Timer() { milliseconds += std::chrono::duration<double, std::milli>(Clock::now() - start).count(); }
-  };
-  const Timer timer{record.milliseconds[static_cast<std::size_t>(stage)]};
+  const Stopwatch watch(record.milliseconds[static_cast<std::size_t>(stage)]);
   return work();
-}
-
-FeatureOptions feature_options(const PipelineOptions& options) {
-  return {.kind = options.features,
-          .points = options.points,
-          .surf_threshold = options.surf_threshold,
-          .oriented = options.oriented,
-          .threads = std::max(1U, options.threads / 2)};
 }
 
 StoreOptions store_options(const PipelineOptions& options) {
@@ -59,22 +45,30 @@ cairn::KeyframeMapOptions map_options(const PipelineOptions& options) {
 
 }  // namespace
 
+FeatureOptions feature_options(const PipelineOptions& options) {
+  return {.kind = options.features,
+          .points = options.points,
+          .surf_threshold = options.surf_threshold,
+          .oriented = options.oriented};
+}
+
 Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options)
     : options_(options),
       rig_(rig),
-      extract_left_(make_extractor(feature_options(options))),
-      extract_right_(make_extractor(feature_options(options))),
-      match_stereo_(rig, options.stereo),
+      front_end_(feature_options(options), options.threads),
+      match_stereo_(std::make_shared<const StereoMatcher>(rig, options.stereo)),
       triangulate_(rig, triangulation_options(options, rig)),
       calibration_(rig, options.calibration),
       store_(make_landmark_store(store_options(options))),
       map_(rig, map_options(options)),
+      budget_(options.budget, options.points),
       motion_(options.motion),
       loop_watch_(options.loops),
       pose_covariance_(cairn::Matrix<6>::Zero()) {
   record_.seed = options.seed;
   record_.threads = options.threads;
   record_.target_points = options.points;
+  record_.budget = options.budget.milliseconds;
   record_.features = feature_names[static_cast<std::size_t>(options.features)];
   record_.store = options.store.kind == StoreKind::multi ? "multi" : "single";
   record_.motion = motion_names[static_cast<std::size_t>(options.motion.filter)];
@@ -107,23 +101,69 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options, 
 }
 
 const FrameRecord& Pipeline::step(const StereoFrame& frame, double load_milliseconds) {
-  record_.frames.emplace_back();
+  front_end_.keep(budget_.points());
+  return step(frame, front_end_(frame, match_stereo_), load_milliseconds);
+}
+
+const FrameRecord& Pipeline::step(const StereoFrame& frame, const FramePoints& points,
+                                  double load_milliseconds) {
+  FrameRecord& result = record_.frames.emplace_back();
+  const auto of = [&](Stage stage) -> double& {
+    return result.milliseconds[static_cast<std::size_t>(stage)];
+  };
+  of(Stage::load) = load_milliseconds;
+  of(Stage::detect) = points.detect_milliseconds;
+  of(Stage::stereo) = points.stereo_milliseconds;
+  of(Stage::total) = ahead_ = points.detect_milliseconds + points.stereo_milliseconds;
+  begun_ = std::chrono::steady_clock::now();
   try {
-    return work_on(frame, load_milliseconds);
+    work_on(frame, points, result);
   } catch (...) {
     record_.frames.pop_back();  // the record holds whole frames
     throw;
   }
+  result.points_wanted = points.wanted;
+  result.shed = budget_.finish(result.points_left, points.wanted, of(Stage::total));
+  return result;
 }
 
-const FrameRecord& Pipeline::work_on(const StereoFrame& frame, double load_milliseconds) {
-  FrameRecord& result = record_.frames.back();
+/// Work on this frame so far. [ms]
+double Pipeline::spent() const {
+  return ahead_ +
+         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begun_).count();
+}
+
+/// Does work that a frame can do without, where its budget has time for it.
+template <class Work>
+void Pipeline::if_time(Shed kind, const Work& work, bool always) {
+  if (!always && !budget_.allows(kind, spent())) return;
+  double milliseconds = 0;
+  {
+    const Stopwatch watch(milliseconds);
+    work();
+  }
+  budget_.took(kind, milliseconds);
+}
+
+std::shared_ptr<const StereoMatcher> Pipeline::settled_matcher() const {
+  return corrects_rig() ? nullptr : match_stereo_;
+}
+
+/// Whether the rig is or may yet come to be another than it is now.
+bool Pipeline::corrects_rig() const {
+  if (options_.calibrate == Calibration::drifting) return true;
+  if (map_.empty()) return options_.calibrate != Calibration::off;
+  return map_.rig_correction().has_value();
+}
+
+void Pipeline::work_on(const StereoFrame& frame, const FramePoints& points, FrameRecord& result) {
   result.index = frame.index;
   result.time = frame.time;
-  result.milliseconds[static_cast<std::size_t>(Stage::load)] = load_milliseconds;
+  left_ = &points.left;
   timed(result, Stage::total, [&] {
-    timed(result, Stage::detect, [&] { detect(frame); });
-    timed(result, Stage::stereo, [&] { find_local_landmarks(frame); });
+    timed(result, Stage::stereo, [&] {
+      find_local_landmarks(points.matched_by == match_stereo_ ? points.pairs : pairs_of(frame, points));
+    });
     constexpr double usual = 0.1;  // [s], where the clock of a recording stands still
     const double dt = time_ ? frame.time - *time_ : usual;
     motion_.predict(dt > 0 && std::isfinite(dt) ? dt : usual);
@@ -137,8 +177,8 @@ const FrameRecord& Pipeline::work_on(const StereoFrame& frame, double load_milli
     if (!T_truth_world_) T_truth_world_ = *frame.truth * T_world_camera_.inverse();
     result.truth = T_truth_world_->inverse() * *frame.truth;
   }
-  result.points_left = static_cast<int>(left_->size());
-  result.points_right = static_cast<int>(right_->size());
+  result.points_left = static_cast<int>(points.left.size());
+  result.points_right = static_cast<int>(points.right.size());
   result.stereo_matches = static_cast<int>(locals_.size());
   result.T_world_camera = T_world_camera_;
   result.covariance = pose_covariance_;
@@ -149,7 +189,6 @@ const FrameRecord& Pipeline::work_on(const StereoFrame& frame, double load_milli
     result.T_world_reference = map_.keyframe_pose(result.reference).value_or(cairn::SE3());
   }
   ++step_;
-  return result;
 }
 
 /// The first frame that shows enough is where the world begins.
@@ -219,10 +258,10 @@ void Pipeline::follow(const StereoFrame& frame, FrameRecord& result) {
   result.inliers = static_cast<int>(located->agreed.size());
   note_loop(*located);
   move_to(*located, result);
-  if (!options_.localise && wants_keyframe(located->agreed.size()))
-    timed(result, Stage::update, [&] { make_keyframe(*located, frame, result); });
+  if (!options_.localise)
+    timed(result, Stage::update, [&] { make_keyframe_if_due(*located, frame, result); });
   timed(result, Stage::store, [&] {
-    if (!options_.localise) age(*located);
+    if (!options_.localise) if_time(Shed::tidying, [&] { age(*located); });
     close_step();
   });
   if (options_.calibrate == Calibration::drifting)
@@ -252,18 +291,12 @@ bool Pipeline::believes(const cairn::MapLocation& here) {
   return true;
 }
 
-/// Interest points of both images, one thread each.
-void Pipeline::detect(const StereoFrame& frame) {
-  cairn::parallel_for(2, options_.threads, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t side = begin; side < end; ++side)
-      (side == 0 ? left_ : right_) = side == 0 ? &extract_left_(frame.left) : &extract_right_(frame.right);
-  });
+std::vector<PointPair> Pipeline::pairs_of(const StereoFrame& frame, const FramePoints& points) const {
+  return (*match_stereo_)(frame.left, points.left, frame.right, points.right, options_.threads);
 }
 
 /// The stereo pairs that make points in space.
-void Pipeline::find_local_landmarks(const StereoFrame& frame) {
-  const std::vector<PointPair> pairs =
-      match_stereo_(frame.left, *left_, frame.right, *right_, options_.threads);
+void Pipeline::find_local_landmarks(std::span<const PointPair> pairs) {
   locals_.clear();
   for (const PointPair& pair : pairs) {
     const double scale = left_->keypoints[pair.left].scale;
@@ -309,7 +342,8 @@ std::optional<Pipeline::Located> Pipeline::locate(std::vector<Match>& matches) {
   }
   matches = std::move(near);
   if (!pose.good()) return std::nullopt;
-  look_again(pose, matches);
+  expected_.clear();
+  if_time(Shed::second_look, [&] { look_again(pose, matches); });
   Located located;
   located.sightings = sightings(matches);
   located.location = map_.locate(pose.T_world_camera, located.sightings);
@@ -368,7 +402,6 @@ void Pipeline::look_again(const cairn::StereoPose& pose, std::vector<Match>& mat
                         locals_[i].left_pixel,
                         locals_[i].right_pixel,
                         {left_->descriptor(locals_[i].point), left_->keypoints[locals_[i].point].laplacian}});
-  expected_.clear();
   for (const LandmarkId id : map_.seen_with(in_play)) {
     if (std::ranges::binary_search(known, id)) continue;
     const Landmark& landmark = landmarks_[id];
@@ -398,17 +431,22 @@ void Pipeline::move_to(const Located& located, FrameRecord& result) {
   }
 }
 
-/// Whether much less of what is seen is known than was at best since the last keyframe.
-bool Pipeline::wants_keyframe(std::size_t agreed) {
-  const double share = static_cast<double>(agreed) / static_cast<double>(locals_.size());
+/// A keyframe is due when much less of what is seen is known than was at best since the last one, and can be
+/// put off until it is as much less again.
+void Pipeline::make_keyframe_if_due(const Located& located, const StereoFrame& frame, FrameRecord& result) {
+  const double share = static_cast<double>(located.agreed.size()) / static_cast<double>(locals_.size());
   best_share_ = std::max(best_share_, share);
-  return share < options_.keyframe_share * best_share_;
+  const double due = options_.keyframe_share * best_share_;
+  if (share < due)
+    if_time(
+        Shed::keyframe, [&] { make_keyframe(located, frame, result); },
+        share < options_.keyframe_share * due);
 }
 
 void Pipeline::make_keyframe(const Located& located, const StereoFrame& frame, FrameRecord& result) {
   if (!map_.add_keyframe(located.location, located.sightings)) return;
   if (map_.rig_correction()) look_through(map_.rig());
-  merge_twins(located);
+  if_time(Shed::tidying, [&] { merge_twins(located); });
   add_landmarks(located.agreed, frame);
   result.keyframe = true;
   best_share_ = 0;
@@ -480,10 +518,12 @@ void Pipeline::note_loop(const Located& located) {
       others.push_back(sighting(match.local, match.landmark));
   }
   if (!loop_watch_.observe(step_, away) || lost_) return;
-  const cairn::MapLocation before = map_.locate(located.location.T_world_camera, others);
   LoopClosure loop{record_.frames.size() - 1, back.size(), 0, std::nullopt};
   loop.away = static_cast<int>(cairn::median(std::move(back)));
-  if (before.good()) loop.T_world_before = before.T_world_camera;
+  if_time(Shed::tidying, [&] {
+    const cairn::MapLocation before = map_.locate(located.location.T_world_camera, others);
+    if (before.good()) loop.T_world_before = before.T_world_camera;
+  });
   record_.loops.push_back(loop);
 }
 
@@ -569,7 +609,7 @@ void Pipeline::take_rig(const cairn::StereoRig& rig) {
 void Pipeline::look_through(const cairn::StereoRig& rig) {
   rig_ = rig;
   triangulate_ = cairn::Triangulator(rig, triangulation_options(options_, rig));
-  match_stereo_ = StereoMatcher(rig, options_.stereo);
+  match_stereo_ = std::make_shared<const StereoMatcher>(rig, options_.stereo);
 }
 
 void Pipeline::earliest_first(std::vector<Match>& matches) const {

@@ -14,6 +14,7 @@
 #pragma once
 
 #include <array>
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -31,6 +32,8 @@
 
 #include "dataset.hpp"
 #include "feature_choice.hpp"
+#include "frame_budget.hpp"
+#include "front_end.hpp"
 #include "guided_matching.hpp"
 #include "landmark_store.hpp"
 #include "landmarks.hpp"
@@ -75,6 +78,7 @@ struct PipelineOptions {
 
   double pixel_sigma = 0.35;     ///< noise of the coordinates of a point of scale 1 [pixels]
   double scale_exponent = 0.65;  ///< it grows with this power of the scale
+  FrameBudgetOptions budget;     ///< of the work on a frame; what it leaves out depends on the clock
   GuidedMatchingOptions second_look;
   std::size_t min_inliers = 10;         ///< fewer: the frame is lost
   std::size_t relocating_inliers = 25;  ///< fewer: a camera that is lost stays so
@@ -98,6 +102,9 @@ struct PipelineOptions {
   bool localise = false;         ///< a loaded map stays as it is: no keyframe, no landmark more
 };
 
+/// The interest points that a pipeline with these options works on.
+[[nodiscard]] FeatureOptions feature_options(const PipelineOptions& options);
+
 /// The system. Feed it frames in order; then ask for the record.
 class Pipeline {
 public:
@@ -111,6 +118,15 @@ public:
   /// Works on one frame; `load_milliseconds` is what reading it took. Returns what came of it. Where that
   /// throws the record is of the frames before.
   const FrameRecord& step(const StereoFrame& frame, double load_milliseconds = 0);
+  /// The same for a frame whose points a front end with feature_options() found; pairs by another matcher
+  /// than the rig's as it is now are not looked at.
+  const FrameRecord& step(const StereoFrame& frame, const FramePoints& points, double load_milliseconds = 0);
+
+  /// What finds the stereo pairs of all frames to come; nullptr while the rig may still be corrected.
+  [[nodiscard]] std::shared_ptr<const StereoMatcher> settled_matcher() const;
+
+  /// Points that an image of the next frames should have, to keep within the budget.
+  [[nodiscard]] int wanted_points() const noexcept { return budget_.points(); }
 
   /// Everything that happened, with the map as it stands now.
   [[nodiscard]] RunRecord record();
@@ -138,9 +154,13 @@ private:
     std::vector<Match> agreed;
   };
 
-  const FrameRecord& work_on(const StereoFrame& frame, double load_milliseconds);
-  void detect(const StereoFrame& frame);
-  void find_local_landmarks(const StereoFrame& frame);
+  void work_on(const StereoFrame& frame, const FramePoints& points, FrameRecord& result);
+  [[nodiscard]] double spent() const;
+  template <class Work>
+  void if_time(Shed kind, const Work& work, bool always = false);
+  [[nodiscard]] bool corrects_rig() const;
+  [[nodiscard]] std::vector<PointPair> pairs_of(const StereoFrame& frame, const FramePoints& points) const;
+  void find_local_landmarks(std::span<const PointPair> pairs);
   [[nodiscard]] std::vector<Match> match_with_map() const;
   /// Leaves of `matches` what can be where the motion leads, and adds what the second look finds.
   [[nodiscard]] std::optional<Located> locate(std::vector<Match>& matches);
@@ -151,7 +171,7 @@ private:
   void follow(const StereoFrame& frame, FrameRecord& result);
   void lose(const StereoFrame& frame, const std::string& why, FrameRecord& result);
   void move_to(const Located& located, FrameRecord& result);
-  [[nodiscard]] bool wants_keyframe(std::size_t agreed);
+  void make_keyframe_if_due(const Located& located, const StereoFrame& frame, FrameRecord& result);
   void make_keyframe(const Located& located, const StereoFrame& frame, FrameRecord& result);
   void add_landmarks(const std::vector<Match>& known, const StereoFrame& frame);
   void close_step();
@@ -177,16 +197,18 @@ private:
 
   PipelineOptions options_;
   cairn::StereoRig rig_;
-  Extractor extract_left_, extract_right_;
-  const cairn::Features* left_ = nullptr;  // of the current frame; they live in the extractors
-  const cairn::Features* right_ = nullptr;
-  StereoMatcher match_stereo_;
+  FrontEnd front_end_;
+  const cairn::Features* left_ = nullptr;  // of the frame that is worked on
+  std::shared_ptr<const StereoMatcher> match_stereo_;
   cairn::Triangulator triangulate_;
   SelfCalibration calibration_;
   std::unique_ptr<LandmarkStore> store_;
   Landmarks landmarks_;
   cairn::KeyframeMap map_;
   NoiseFactors noise_factors_;
+  FrameBudget budget_;
+  std::chrono::steady_clock::time_point begun_;  // work on the frame, here
+  double ahead_ = 0;                             // work on it before [ms]
   PoseFilter motion_;
   std::optional<double> time_;  // of the frame before [s]
   LoopWatch loop_watch_;

@@ -19,6 +19,8 @@
 #include <cairn/manifold/se3.hpp>
 #include <cairn/vision/image.hpp>
 
+#include "frame_budget.hpp"
+
 namespace stereo_slam {
 
 /// The stages of one step, in order; names as they stand in timing.json.
@@ -37,6 +39,7 @@ struct FrameRecord {
   bool relocalised = false;  ///< tracked, though nothing was known of where the camera is
   int points_left = 0;
   int points_right = 0;
+  int points_wanted = 0;  ///< in an image; fewer than were asked for where the budget is short
   int stereo_matches = 0;
   int map_matches = 0;
   int inliers = 0;
@@ -46,6 +49,7 @@ struct FrameRecord {
   std::size_t reference = 0;     ///< the newest keyframe, in the order of adding
   cairn::SE3 T_world_reference;  ///< its pose as it was then
   double fit = 0;                ///< median chi^2 of the inliers over what right sigmas make it; 0: none
+  ShedSet shed;                  ///< what the budget left out
   std::array<double, stage_names.size()> milliseconds{};
 };
 
@@ -98,7 +102,8 @@ struct RunRecord {
   std::uint64_t seed = 0;
   unsigned threads = 1;
   int target_points = 0;
-  double seconds = 0;  ///< wall time of the whole run
+  std::optional<double> budget;  ///< of work a frame [ms]
+  double seconds = 0;            ///< wall time of the whole run
   std::vector<FrameRecord> frames;
   std::vector<LandmarkRecord> landmarks;
   CalibrationRecord calibration;

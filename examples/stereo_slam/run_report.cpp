@@ -66,6 +66,10 @@ void add_figures(example::Report& report, const Summary& summary) {
   if (summary.frames_carried > 0)
     report.figure({"frames carried", std::to_string(summary.frames_carried), "of the lost",
                    "their pose is where the motion leads"});
+  if (summary.budget)
+    report.figure({"frames that left work out", std::to_string(summary.budget->frames_shed),
+                   "of " + std::to_string(summary.frames),
+                   "budget of " + readable(summary.budget->milliseconds) + " ms a frame"});
   report.figure({"path", readable(summary.path), "m", ""});
   report.figure({"landmarks", std::to_string(summary.landmarks), "", "in the map at the end"});
   report.figure({"keyframes", std::to_string(summary.keyframes), "", "in the map at the end"});
@@ -274,6 +278,23 @@ example::LinePlot consistency_plot(const RunRecord& run, const TimeAxis& time) {
   return plot;
 }
 
+/// What the budget left out, kind by kind.
+std::optional<example::Table> budget_table(const Summary& summary) {
+  if (!summary.budget) return std::nullopt;
+  constexpr std::array<const char*, shed_names.size()> meanings{
+      "old and twin landmarks were kept for longer, the worth of a loop was not computed",
+      "fewer interest points than asked for", "no search for landmarks where they must be",
+      "a keyframe was put off"};
+  example::Table table{.title = "What the budget left out",
+                       .caption = "Missed least first. " + std::to_string(summary.budget->frames_over) +
+                                  " frames took longer than the budget all the same.",
+                       .columns = {"left out", "frames", "which means"},
+                       .rows = {}};
+  for (std::size_t kind = 0; kind < shed_names.size(); ++kind)
+    table.rows.push_back({shed_names[kind], std::to_string(summary.budget->shed[kind]), meanings[kind]});
+  return table;
+}
+
 example::LinePlot match_plot(const RunRecord& run, const TimeAxis& time) {
   const auto count = [&](int FrameRecord::* member) {
     return over_frames(run, [&](const FrameRecord& frame) { return frame.*member; });
@@ -362,12 +383,14 @@ example::Report run_report(const RunRecord& run, const Summary& summary) {
   example::Report report("Stereo SLAM: " + run.dataset, subtitle_of(run, summary));
   add_figures(report, summary);
   if (run.ended_early) report.note(*run.ended_early);
+  if (summary.budget) report.note(budget_text(*summary.budget));
   for (const std::string& note : run.notes) report.note(note);
   const TimeAxis time = time_axis(run);
   report.add(map_cloud(run));
   report.add(path_plot(run));
   if (const auto film = correction_film(run, summary)) report.add(*film);
   if (const auto table = loop_table(summary)) report.add(*table);
+  if (const auto table = budget_table(summary)) report.add(*table);
   report.add(sample_picture(run));
   report.add(error_plot(run, time, false));
   report.add(error_plot(run, time, true));

@@ -15,6 +15,7 @@
 #include <cairn/eval/consistency.hpp>
 #include <cairn/eval/kitti_metric.hpp>
 #include <cairn/eval/trajectory_error.hpp>
+#include <cairn/io/text.hpp>
 
 namespace stereo_slam {
 namespace {
@@ -101,6 +102,20 @@ std::optional<std::size_t> earlier_at_same_place(const std::vector<cairn::PosePa
     smallest = squared;
   }
   return nearest;
+}
+
+std::optional<BudgetEffect> budget_effect(const RunRecord& run) {
+  if (!run.budget) return std::nullopt;
+  BudgetEffect effect{.milliseconds = *run.budget, .frames = run.frames.size()};
+  effect.fewest_points = run.target_points;
+  for (const FrameRecord& frame : run.frames) {
+    effect.frames_over += frame.milliseconds[static_cast<std::size_t>(Stage::total)] > *run.budget ? 1U : 0U;
+    effect.frames_shed += frame.shed.any() ? 1U : 0U;
+    for (std::size_t kind = 0; kind < shed_names.size(); ++kind)
+      effect.shed[kind] += frame.shed[kind] ? 1U : 0U;
+    effect.fewest_points = std::min(effect.fewest_points, frame.points_wanted);
+  }
+  return effect;
 }
 
 void expect_frames(const RunRecord& run) {
@@ -250,6 +265,7 @@ Summary summarise(const RunRecord& run) {
   summary.inliers = median_over_frames(run, &FrameRecord::inliers);
   summary.landmarks = run.landmarks.size();
   summary.path = path_length(run);
+  summary.budget = budget_effect(run);
   summary.loops_closed = run.loops.size();
   summary.loops = loop_effects(run);
   summary.path_error = path_error(run);
@@ -259,6 +275,21 @@ Summary summarise(const RunRecord& run) {
   summary.errors = errors_against(pairs);
   summary.errors->consistency = consistency_of(run);
   return summary;
+}
+
+std::string budget_text(const BudgetEffect& effect) {
+  std::string text = "budget of " + cairn::shortest(effect.milliseconds) +
+                     " ms a frame: " + std::to_string(effect.frames_shed) + " of " +
+                     std::to_string(effect.frames) + " frames left work out";
+  for (std::size_t kind = 0; kind < shed_names.size(); ++kind) {
+    if (effect.shed[kind] == 0) continue;
+    std::string name = shed_names[kind];
+    std::ranges::replace(name, '_', ' ');
+    text += ", " + name + " " + std::to_string(effect.shed[kind]) + " times";
+    if (kind == static_cast<std::size_t>(Shed::points))
+      text += " (at least " + std::to_string(effect.fewest_points) + " an image)";
+  }
+  return text + "; " + std::to_string(effect.frames_over) + " took longer";
 }
 
 std::string summary_json(const RunRecord& run, const Summary& summary) {
@@ -302,6 +333,15 @@ std::string summary_json(const RunRecord& run, const Summary& summary) {
     one["sigma"] = number(run.calibration.sigmas(i));
   }
   json["target_points"] = run.target_points;
+  if (summary.budget) {
+    Json& budget = json["budget"];
+    budget["ms"] = number(summary.budget->milliseconds);
+    budget["frames_over"] = summary.budget->frames_over;
+    budget["frames_shed"] = summary.budget->frames_shed;
+    for (std::size_t kind = 0; kind < shed_names.size(); ++kind)
+      budget["shed"][shed_names[kind]] = summary.budget->shed[kind];
+    budget["fewest_points"] = summary.budget->fewest_points;
+  }
   json["notes"] = run.notes;
   return text_of(json);
 }

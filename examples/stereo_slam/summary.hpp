@@ -88,6 +88,16 @@ struct PathError {
   double at_the_end = 0;
 };
 
+/// What the time a frame may take made the run do without.
+struct BudgetEffect {
+  double milliseconds = 0;                            ///< of work a frame
+  std::size_t frames = 0;                             ///< of the run
+  std::size_t frames_over = 0;                        ///< that took longer all the same
+  std::size_t frames_shed = 0;                        ///< that left something out
+  std::array<std::size_t, shed_names.size()> shed{};  ///< frames that left it out, by kind
+  int fewest_points = 0;                              ///< that were looked for in an image
+};
+
 struct Summary {
   std::size_t frames = 0;
   std::size_t frames_tracked = 0;
@@ -103,6 +113,7 @@ struct Summary {
   std::size_t loops_closed = 0;
   std::vector<LoopEffect> loops;
   std::optional<PathError> path_error;
+  std::optional<BudgetEffect> budget;  ///< nothing where there was none
   double path = 0;  ///< [m], of the truth where every frame has one, otherwise of the estimate
   std::optional<TruthErrors> errors;
 };
@@ -137,11 +148,15 @@ struct Timing {
 /// The key figures of a run with at least one frame. Throws cairn::Error without frames.
 [[nodiscard]] Summary summarise(const RunRecord& run);
 
+/// The same as a sentence.
+[[nodiscard]] std::string budget_text(const BudgetEffect& effect);
+
 /// The times of a run with at least one frame. Throws cairn::Error without frames.
 [[nodiscard]] Timing timing(const RunRecord& run);
 
 /// summary.json of a run: SI units as the keys say, null where nothing is known. Has no times and no number
-/// of threads: a run with the same options on the same data gives the same bytes.
+/// of threads: a run with the same options on the same data gives the same bytes, unless it has a budget of
+/// time.
 [[nodiscard]] std::string summary_json(const RunRecord& run, const Summary& summary);
 
 /// timing.json of a run: everything that is another the next time.

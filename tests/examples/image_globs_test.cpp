@@ -12,7 +12,6 @@
 #include "dataset.hpp"
 #include "recording.hpp"
 #include "support/folder.hpp"
-#include "support/rig_file.hpp"
 
 namespace image_globs_test {
 namespace {
@@ -106,7 +105,6 @@ TEST_SUITE("image_globs") {
     CHECK(says(refusal({"", "", {}}), "no file has such a name"));
   }
 
-#ifdef EXAMPLES_HAVE_YAML
   TEST_CASE(
       "image_globs: images with a rig are a data set, those of another size than the rig's are refused") {
     const Images images({"1.pgm", "2.pgm"}, {"1.pgm", "2.pgm"});
@@ -115,16 +113,10 @@ TEST_SUITE("image_globs") {
       p.fx = p.fy = 20;
       p.width = width;
       p.height = 8;
-      example::write_rig(images / "rig.yaml", {{cairn::PinholeCamera(p), cairn::PinholeCamera(p),
-                                                cairn::SE3(cairn::SO3(), cairn::Vector<3>(0.1, 0, 0))},
-                                               {},
-                                               {},
-                                               {},
-                                               {},
-                                               {}});
       stereo_slam::DatasetOptions options;
       options.kind = "images";
-      options.camera = images / "rig.yaml";
+      options.rig = cairn::StereoRig{cairn::PinholeCamera(p), cairn::PinholeCamera(p),
+                                     cairn::SE3(cairn::SO3(), cairn::Vector<3>(0.1, 0, 0))};
       options.left = images.globs().left;
       options.right = images.globs().right;
       return stereo_slam::open_dataset(options);
@@ -142,11 +134,10 @@ TEST_SUITE("image_globs") {
     CHECK(says(cairn_test::message_of([&] { static_cast<void>(stereo_slam::open_dataset(options)); }),
                "images need a rig"));
     options.kind = "arena";
-    options.camera = images / "rig.yaml";
+    options.rig = dataset->rig();
     CHECK(says(cairn_test::message_of([&] { static_cast<void>(stereo_slam::open_dataset(options)); }),
                "the arena is rendered with a rig of its own"));
   }
-#endif
 }
 
 }  // namespace image_globs_test

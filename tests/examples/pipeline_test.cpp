@@ -134,6 +134,48 @@ TEST_SUITE("pipeline") {
     CHECK(same_bits(run(drive(), multi), run(drive(), single)));
   }
 
+  TEST_CASE("pipeline: with hardly any time it still says of every frame where it is, and what it left out") {
+    PipelineOptions hurried = options();
+    hurried.budget.milliseconds = 1e-3;
+    const RunRecord record = run(drive(), hurried);
+    using stereo_slam::Shed;
+    const auto left_out = [](const FrameRecord& frame, Shed kind) {
+      return frame.shed[static_cast<std::size_t>(kind)];
+    };
+    REQUIRE(record.frames.size() == drive().size());
+    CHECK(record.budget == 1e-3);
+    CHECK(record.frames.front().points_wanted == 700);
+    CHECK(record.frames.back().points_wanted == 300);
+    CHECK(record.frames.back().points_left <= 300);
+    std::size_t put_off = 0, keyframes = 0;
+    for (const FrameRecord& frame : record.frames) {
+      CAPTURE(frame.index);
+      CHECK(frame.tracked);
+      const auto error = cairn::local(*frame.truth, frame.T_world_camera);
+      CHECK(error.head<3>().norm() < 0.03);
+      CHECK(error.tail<3>().norm() < 0.01);
+      if (frame.index == 0) continue;
+      CHECK(left_out(frame, Shed::tidying));
+      CHECK(left_out(frame, Shed::second_look));
+      put_off += left_out(frame, Shed::keyframe) ? 1 : 0;
+      keyframes += frame.keyframe ? 1 : 0;
+    }
+    CHECK(put_off > 0);
+    CHECK(keyframes > 0);  // not for ever
+    CHECK(keyframes < run(drive(), options()).frames.back().keyframes);
+    CHECK(record.merged == 0);
+    CHECK(record.aged == 0);
+    CHECK(same_bits(record, run(drive(), hurried)));  // nothing is ever in time
+  }
+
+  TEST_CASE("pipeline: a budget that is never used up changes no bit") {
+    PipelineOptions easy = options();
+    easy.budget.milliseconds = 1e6;
+    const RunRecord record = run(drive(), easy);
+    CHECK(same_bits(record, run(drive(), options())));
+    for (const FrameRecord& frame : record.frames) CHECK(frame.shed.none());
+  }
+
   TEST_CASE("pipeline: a black pair is lost, said, counted, and the drive goes on") {
     std::vector<StereoFrame> frames = drive();
     frames[6] = black(frames[6]);

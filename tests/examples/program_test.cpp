@@ -21,9 +21,11 @@
 #include <cairn/io/file.hpp>
 #include <cairn/io/trajectory.hpp>
 #include <cairn/version.hpp>
+#include <cairn/vision/image.hpp>
 
 #include "support/folder.hpp"
 #include "support/http.hpp"
+#include "support/image_io.hpp"
 #include "support/live_page.hpp"
 #include "support/program_checks.hpp"
 #include "support/random.hpp"
@@ -48,10 +50,12 @@ Outcome run(const std::string& arguments, const std::string& standard_output = "
                                  standard_output);
 }
 
-int run_and_interrupt(const fs::path& out, int frames, std::initializer_list<int> signals) {
+int run_and_interrupt(const fs::path& out, int frames, std::initializer_list<int> signals,
+                      const std::string& threads = "2") {
   keep_pictures();
   return cairn_test::interrupt_program(
-      {STEREO_SLAM_PROGRAM, "--frames", std::to_string(frames), "--out", out.string()}, signals);
+      {STEREO_SLAM_PROGRAM, "--frames", std::to_string(frames), "--threads", threads, "--out", out.string()},
+      signals);
 }
 
 nlohmann::json summary_in(const fs::path& out) {
@@ -122,7 +126,7 @@ TEST_SUITE("program") {
     tear(folder / "drive" / "image_1" / "000005.png");
     const std::string arguments = "--dataset kitti_odometry \"" + (folder / "drive").string() +
                                   "\" --out \"" + (folder / "out").string() + "\"";
-    for (const std::string threads : {"1", "2"}) {
+    for (const std::string threads : {"1", "2", "3", "8"}) {
       const Outcome outcome = run(arguments + " --threads " + threads);
       CAPTURE(outcome.words);
       CHECK(outcome.code == 3);
@@ -270,6 +274,21 @@ TEST_SUITE("program") {
     }
   }
 
+  TEST_CASE("stereo_slam: interrupted with frames under way, it has every frame that it counted, as ever") {
+    const cairn_test::Folder folder;
+    REQUIRE(run("--frames 30 --threads 1 --out \"" + (folder / "whole").string() + "\"").code == 0);
+    const std::string whole = cairn::read_file(folder / "whole" / "trajectory.tum");
+    for (const std::string threads : {"1", "2", "8"}) {
+      CAPTURE(threads);
+      CHECK(run_and_interrupt(folder / "out", 30, {SIGINT}, threads) == 4);
+      const std::string part = cairn::read_file(folder / "out" / "trajectory.tum");
+      CHECK(part.size() < whole.size());
+      CHECK(whole.starts_with(part));
+      CHECK(cairn::read_tum(folder / "out" / "trajectory.tum").size() ==
+            summary_in(folder / "out")["frames"]);
+    }
+  }
+
   TEST_CASE("stereo_slam: interrupted twice, it ends at once") {
     const cairn_test::Folder folder;
     CHECK(run_and_interrupt(folder / "out", 30, {SIGINT, SIGINT}) == -SIGINT);
@@ -318,22 +337,112 @@ TEST_SUITE("program") {
     CHECK(outcome.says((folder / "file").string()));
   }
 
-  TEST_CASE("stereo_slam: every file is the same bytes for 1, 2 and 3 threads and the next time, but times") {
+  TEST_CASE(
+      "stereo_slam: every file is the same bytes for 1, 2, 3 and 8 threads and the next time, but times") {
+    // With a rig that is settled the stereo pairs are found ahead, with one that is corrected they are not.
+    for (const std::string rig : {"", " --calibrate on", " --calibrate drifting"}) {
+      CAPTURE(rig);
+      const cairn_test::Folder folder;
+      for (const std::string out : {"1", "2", "3", "8", "2 again"}) {
+        const Outcome outcome = run("--frames 8" + rig + " --threads " + out.substr(0, 1) + " --out \"" +
+                                    (folder / ("out " + out)).string() + "\"");
+        CAPTURE(outcome.words);
+        REQUIRE(outcome.code == 0);
+        REQUIRE(names_in(folder / ("out " + out)) == results());
+      }
+      for (const std::string& name : results()) {
+        CAPTURE(name);
+        const std::string bytes = cairn::read_file(folder / "out 1" / name);
+        CHECK_FALSE(bytes.empty());
+        for (const char* out : {"out 2", "out 3", "out 8", "out 2 again"})
+          CHECK((cairn::read_file(folder / out / name) == bytes) == (name != "timing.json"));
+      }
+    }
+  }
+
+  TEST_CASE(
+      "stereo_slam: a budget that is far too small sheds work and says so, and every frame has a pose") {
     const cairn_test::Folder folder;
-    for (const std::string out : {"1", "2", "3", "2 again"}) {
-      const Outcome outcome = run("--frames 4 --threads " + out.substr(0, 1) + " --out \"" +
-                                  (folder / ("out " + out)).string() + "\"");
+    const auto out = [&](const std::string& name) { return " --out \"" + (folder / name).string() + "\""; };
+    REQUIRE(run("--frames 16 --script loop" + out("free")).code == 0);
+    CHECK_FALSE(summary_in(folder / "free").contains("budget"));
+    for (const std::string threads : {"1", "3"}) {
+      CAPTURE(threads);
+      const Outcome hurried =
+          run("--frames 16 --script loop --budget 0.5 --threads " + threads + out("hurried"));
+      CAPTURE(hurried.words);
+      REQUIRE(hurried.code == 0);
+      CHECK(
+          hurried.says("budget of 0.5 ms a frame: 15 of 16 frames left work out, tidying 15 times, points "));
+      CHECK(names_in(folder / "hurried") == results());
+      CHECK(cairn::read_tum(folder / "hurried" / "trajectory.tum").size() == 16);
+      const nlohmann::json summary = summary_in(folder / "hurried");
+      CHECK(summary["frames_lost"] == 0);
+      CHECK(summary["max_position_error_m"] < 0.05);
+      CHECK(summary["max_heading_error_deg"] < 0.5);
+      const nlohmann::json& budget = summary["budget"];
+      CHECK(budget["frames_over"] == 16);
+      CHECK(budget["frames_shed"] == 15);  // the first makes the map
+      CHECK(budget["fewest_points"] < 2000);
+      CHECK(budget["fewest_points"] >= 300);
+      CHECK(budget["shed"]["tidying"] == 15);
+      CHECK(budget["shed"]["second_look"] == 15);
+      CHECK(budget["shed"]["keyframe"] < 15);
+      if (example::has_report_page())
+        CHECK(cairn::read_file(folder / "hurried" / "report.html").find("What the budget left out") !=
+              std::string::npos);
+    }
+    REQUIRE(run("--frames 16 --script loop --budget 1e6" + out("easy")).code == 0);
+    CHECK(summary_in(folder / "easy")["budget"]["frames_shed"] == 0);
+    CHECK(cairn::read_file(folder / "easy" / "trajectory.tum") ==
+          cairn::read_file(folder / "free" / "trajectory.tum"));
+    for (const char* bad : {"0", "-3", "soon", "inf"}) {
+      CAPTURE(bad);
+      const Outcome refused = run(std::string("--budget ") + bad + out("none"));
+      CHECK(refused.code == 2);
+      CHECK(refused.says("--budget"));
+    }
+    CHECK_FALSE(fs::exists(folder / "none"));
+  }
+
+  TEST_CASE(
+      "stereo_slam: --motion carries the camera over frames that show nothing, by each of its filters") {
+    const cairn_test::Folder folder;
+    make_drive(folder, 9);
+    const fs::path images = folder / "drive";
+    const std::string arguments =
+        "--dataset kitti_odometry \"" + images.string() + "\" --out \"" + (folder / "out").string() + "\"";
+    const auto poses = [&] { return cairn::read_tum(folder / "out" / "trajectory.tum"); };
+    REQUIRE(run(arguments).code == 0);
+    const cairn::Trajectory seen = poses();
+    for (const char* name : {"000005.png", "000006.png"})
+      for (const char* side : {"image_0", "image_1"})
+        example::write_png(images / side / name, cairn::Image(768, 576));
+    const auto error = [&](std::size_t i) {
+      return (poses()[i].T_world_body.translation() - seen[i].T_world_body.translation()).norm();
+    };
+    for (const std::string motion : {"off", "ekf", "iterated", "ukf"}) {
+      CAPTURE(motion);
+      const Outcome outcome = run(arguments + " --motion " + motion);
       CAPTURE(outcome.words);
       REQUIRE(outcome.code == 0);
-      REQUIRE(names_in(folder / ("out " + out)) == results());
+      const nlohmann::json summary = summary_in(folder / "out");
+      CHECK(summary["motion"] == motion);
+      CHECK(summary["frames_lost"] == 2);
+      CHECK(summary["frames_carried"] == (motion == "off" ? 0 : 2));
+      CHECK(outcome.says(motion == "off" ? "the last pose is kept" : "the motion goes on"));
+      REQUIRE(poses().size() == 9);
+      // The camera is where it was seen last, or where its motion led.
+      const double step = (seen[6].T_world_body.translation() - seen[4].T_world_body.translation()).norm();
+      CHECK((error(6) > 0.9 * step) == (motion == "off"));
+      CHECK(error(6) < (motion == "off" ? 1.1 : 0.5) * step);
+      CHECK(error(8) < 0.02);
     }
-    for (const std::string& name : results()) {
-      CAPTURE(name);
-      const std::string bytes = cairn::read_file(folder / "out 1" / name);
-      CHECK_FALSE(bytes.empty());
-      for (const char* out : {"out 2", "out 3", "out 2 again"})
-        CHECK((cairn::read_file(folder / out / name) == bytes) == (name != "timing.json"));
-    }
+    const Outcome unknown = run(arguments + " --motion kalman");
+    CHECK(unknown.code == 2);
+    CHECK(unknown.says("--motion"));
+    CHECK(unknown.says("kalman"));
+    for (const char* name : {"off", "ekf", "iterated", "ukf"}) CHECK(unknown.says(name));
   }
 
   TEST_CASE("stereo_slam: --live shows the run while it goes on, and changes nothing of its results") {

@@ -203,6 +203,38 @@ TEST_CASE("summary: counts and medians are those of the frames, and times are no
   CHECK(json_of(run)["ended_early"] == "after frame 100: no more light");
 }
 
+TEST_CASE("summary: what a budget left out is counted by kind, and without one nothing is said of it") {
+  RunRecord run = straight_run(10);
+  CHECK_FALSE(json_of(run).contains("budget"));
+  run.budget = 20;
+  for (auto& frame : run.frames) {
+    frame.points_wanted = 2000;
+    frame.milliseconds.fill(0);
+  }
+  using stereo_slam::Shed;
+  const auto leave_out = [&](std::size_t frame, Shed kind) {
+    run.frames[frame].shed.set(static_cast<std::size_t>(kind));
+  };
+  leave_out(2, Shed::second_look);
+  leave_out(2, Shed::points);
+  leave_out(3, Shed::points);
+  leave_out(7, Shed::tidying);
+  run.frames[2].points_wanted = 800;
+  run.frames[3].points_wanted = 900;
+  run.frames[4].milliseconds.back() = 20.5;
+  const nlohmann::json expected = {
+      {"ms", 20.0},
+      {"frames_over", 1},
+      {"frames_shed", 3},
+      {"shed", {{"tidying", 1}, {"points", 2}, {"second_look", 1}, {"keyframe", 0}}},
+      {"fewest_points", 800}};
+  CHECK(json_of(run)["budget"] == expected);
+  CHECK(stereo_slam::budget_text(*stereo_slam::summarise(run).budget) ==
+        "budget of 20 ms a frame: 3 of 10 frames left work out, tidying 1 times, points 2 times (at least "
+        "800 an "
+        "image), second look 1 times; 1 took longer");
+}
+
 TEST_CASE("timing: what differs from run to run stands here, for the run and for every frame") {
   const RunRecord run = straight_run(101);
   const auto json = nlohmann::json::parse(stereo_slam::timing_json(run));
