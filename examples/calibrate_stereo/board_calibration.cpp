@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 #include <Eigen/Cholesky>
@@ -312,6 +313,28 @@ BoardCalibration calibrate(std::span<const cairn::Vector<3>> board, std::span<co
   for (ViewError& view : result.views)
     for (double* sum : {&view.left, &view.right}) *sum = std::sqrt(*sum / static_cast<double>(board.size()));
   return result;
+}
+
+double largest_difference(const BoardCalibration& calibration, const cairn::StereoRig& other) {
+  const example::CalibratedRig& own = calibration.rig;
+  double largest = 0;
+  const auto compare = [&](double difference, double sigma) {
+    if (sigma > 0) largest = std::max(largest, std::abs(difference) / sigma);
+  };
+  for (const auto& [camera, sigmas, others] : {std::tuple{&own.rig.left, &own.left, &other.left},
+                                               std::tuple{&own.rig.right, &own.right, &other.right}}) {
+    const auto here = numbers_of(*camera), there = numbers_of(*others);
+    for (std::size_t i = 0; i < here.size(); ++i)
+      compare(there[i] - here[i], i < 4 ? (*sigmas->intrinsics)[i] : (*sigmas->distortion)[i - 4]);
+  }
+  const cairn::Vector<3> turn =
+      (own.rig.T_left_right.rotation().inverse() * other.T_left_right.rotation()).log();
+  const cairn::Vector<3> shift = other.T_left_right.translation() - own.rig.T_left_right.translation();
+  for (int i = 0; i < 3; ++i) {
+    compare(turn(i), (*own.rotation_sigma)(i));
+    compare(shift(i), (*own.translation_sigma)(i));
+  }
+  return largest;
 }
 
 HeldOut check_view(std::span<const cairn::Vector<3>> board, int columns, const BoardView& view,

@@ -66,6 +66,11 @@ struct BoardCalibration {
                                          std::span<const cairn::SE3> T_left_board,
                                          const BoardCalibrationOptions& options = {});
 
+/// How far a number of another calibration of the same views is from this one's at most, in this one's
+/// standard deviations: of both cameras and of the right one's pose. Numbers that were not estimated are left
+/// out.
+[[nodiscard]] double largest_difference(const BoardCalibration& calibration, const cairn::StereoRig& other);
+
 /// What a calibration says of a view that was none of its own.
 struct HeldOut {
   double epipolar = 0;  ///< RMS [pixels]

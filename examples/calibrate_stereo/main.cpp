@@ -105,6 +105,7 @@ Results run(const Arguments& arguments) {
     results.start_rms = start.rms;
     results.calibration =
         calibrate(results.board, results.views, start.rig, start.T_left_board, arguments.calibration);
+    results.start_difference = largest_difference(results.calibration, start.rig);
     const std::size_t before = results.views.size();
     if (round == 0) leave_out_mistaken(results.calibration, results);
     if (results.views.size() == before) break;

@@ -44,6 +44,7 @@ std::string summary(const Results& r) {
   json["board"] = {{"columns", r.columns}, {"rows", r.rows}, {"square_m", r.square}};
   json["rms_px"] = c.rms;
   json["opencv_rms_px"] = r.start_rms;
+  json["opencv_largest_difference_sigma"] = r.start_difference;
   json["pixel_sigma_px"] = c.pixel_sigma;
   json["held_out"] = {{"epipolar_rms_px", held_out_epipolar(r)}, {"length_error", held_out_length(r)}};
   json["baseline_m"] = {{"value", c.rig.rig.baseline()}, {"sigma", c.baseline_sigma}};

@@ -24,6 +24,7 @@ struct Results {
   BoardCalibration calibration;
   std::vector<HeldOut> held_out;  ///< one a view
   double start_rms = 0;           ///< OpenCV's [pixels]
+  double start_difference = 0;    ///< of a number from OpenCV's at most, in standard deviations
   cairn::Image sample;            ///< left image of the first view
   std::vector<std::string> notes;
 };

@@ -163,6 +163,12 @@ TEST_SUITE("board_calibration") {
     CHECK(c.rig.rig.left.parameters().k1 != start.left.parameters().k1);
     CHECK((*c.rig.left.distortion)[2] == 0);
     CHECK((*c.rig.left.distortion)[0] > 0);
+    CHECK(largest_difference(c, c.rig.rig) == 0);
+    cairn::StereoRig moved = c.rig.rig;  // by two of the standard deviations
+    moved.T_left_right =
+        moved.T_left_right *
+        cairn::SE3(cairn::SO3::exp({0, 2 * (*c.rig.rotation_sigma)(1), 0}), cairn::Vector<3>::Zero());
+    CHECK(largest_difference(c, moved) == doctest::Approx(2).epsilon(1e-6));
   }
 
   TEST_CASE("board_calibration: what makes no calibration is refused in words") {

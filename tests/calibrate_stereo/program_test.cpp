@@ -75,6 +75,7 @@ TEST_SUITE("calibrate_stereo/program") {
     // Both minimise the same sum.
     CHECK(summary["rms_px"].get<double>() <= 1.002 * summary["opencv_rms_px"].get<double>());
     CHECK(summary["rms_px"].get<double>() < 0.6);
+    CHECK(summary["opencv_largest_difference_sigma"].get<double>() < 0.1);
     CHECK(summary["held_out"]["epipolar_rms_px"].get<double>() < 0.6);
     CHECK(std::abs(summary["held_out"]["length_error"].get<double>()) < 0.005);
     const example::CalibratedRig rig = example::read_rig(folder / "out" / "rig.yaml");
