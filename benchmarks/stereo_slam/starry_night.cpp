@@ -20,6 +20,9 @@
 
 #include <cairn/core/statistics.hpp>
 #include <cairn/eval/consistency.hpp>
+#include <cairn/filter/differentiate.hpp>
+#include <cairn/filter/extended.hpp>
+#include <cairn/filter/gaussian.hpp>
 #include <cairn/geometry/alignment.hpp>
 #include <cairn/geometry/triangulation.hpp>
 #include <cairn/slam/keyframe_map.hpp>
@@ -142,6 +145,43 @@ std::optional<cairn::MapLocation> locate(cairn::KeyframeMap& map, const SE3& gue
   return best;
 }
 
+/// One dot of the map in both images, as a measurement of the camera's pose. [pixels]
+struct DotView {
+  using State = SE3;
+  using Measurement = Vector<4>;
+
+  const cairn::StereoRig* rig;
+  cairn::Gaussian<Vector<3>> dot;  // in the world
+  double sigma;
+
+  [[nodiscard]] Vector<4> predict(const SE3& T_world_camera) const {
+    // Where it is behind the camera, so far out of the image that no gate lets it through.
+    return rig->project(T_world_camera.inverse() * dot.mean).value_or(Vector<4>::Constant(1e6));
+  }
+  [[nodiscard]] Matrix<4> noise(const SE3& T_world_camera) const {
+    Matrix<4> R = sigma * sigma * Matrix<4>::Identity();
+    const SE3 T_camera_world = T_world_camera.inverse();
+    if (const auto seen = rig->project_with_jacobian(T_camera_world * dot.mean)) {
+      const Matrix<4, 3> J = seen->J_point * T_camera_world.rotation().matrix();
+      R += J * dot.covariance * J.transpose();
+    }
+    return R;
+  }
+};
+
+/// What one or two dots say of a pose that they do not determine.
+void correct(cairn::Gaussian<SE3>& camera, cairn::KeyframeMap& map,
+             const std::vector<cairn::StereoSighting>& seen) {
+  const cairn::Extended filter{.gate = cairn::chi_square_quantile(0.9999, 4)};
+  for (const cairn::StereoSighting& s : seen) {
+    const auto dot = map.landmark_in_world(s.landmark);
+    if (!dot) continue;
+    const DotView view{&map.rig(), *dot, s.sigma};
+    const Vector<4> pixels = (Vector<4>() << s.left, s.right).finished();
+    static_cast<void>(filter.update(camera, cairn::numeric(view), pixels));  // refused: it stays
+  }
+}
+
 class Errors {
 public:
   void add(const Vector<6>& error) {
@@ -169,7 +209,7 @@ Outcome map_and_follow(const Record& record) {
 
   const SE3 T_camera_truth = record.truth(outcome.first).inverse();
   SE3 T, reckoned;  // the first camera is the world
-  Matrix<6> P = Matrix<6>::Zero();
+  Matrix<6> P = Matrix<6>::Zero(), claimed;
   double best_share = 0;
   Errors estimate, dead_reckoning;
   cairn::RunningMoments nees;
@@ -184,7 +224,7 @@ Outcome map_and_follow(const Record& record) {
     if (const auto here = locate(map, T, seen)) {
       ++outcome.located;
       T = here->T_world_camera;
-      P = here->covariance;
+      P = claimed = here->covariance;
       // Keyframes by the rule of the pipeline (examples/stereo_slam/pipeline.hpp)
       constexpr double keyframe_share = 0.8;
       const double share = static_cast<double>(here->inlier_count) / static_cast<double>(seen.size());
@@ -193,12 +233,19 @@ Outcome map_and_follow(const Record& record) {
         add_new(seen);
         best_share = 0;
       }
+    } else {
+      // The pose goes on from there, but its covariance as if it had not been: the errors of a dot are the
+      // same from image to image, and would be counted again in every one.
+      cairn::Gaussian<SE3> camera{T, P};
+      correct(camera, map, seen);
+      T = camera.mean;
+      claimed = camera.covariance;
     }
     const SE3 truth = T_camera_truth * record.truth(k);
     const Vector<6> error = cairn::local(T, truth);
     estimate.add(error);
     dead_reckoning.add(cairn::local(reckoned, truth));
-    if (const auto one = cairn::normalised_squared(error, P)) nees.add(*one);
+    if (const auto one = cairn::normalised_squared(error, claimed)) nees.add(*one);
     ++outcome.frames;
   }
   outcome.estimate = estimate.rmse();

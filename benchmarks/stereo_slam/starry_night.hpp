@@ -14,8 +14,9 @@ namespace stereo_slam_bench {
 /// From the first image that shows three dots, the least a pose needs, to the end of the record; nothing of
 /// it is left out, and the noise is the record's own. A frame is located in a KeyframeMap of the library by
 /// the dots it shows, near where the velocities lead or, where too few agree there, near where the dots
-/// themselves put it; one that shows fewer than three known ones is where the velocities lead. "No data"
-/// without the record, or without zlib, which it is packed with.
+/// themselves put it; where it shows fewer than three known ones, which determine no pose, an extended filter
+/// corrects with them what the velocities say. "No data" without the record, or without zlib, which it is
+/// packed with.
 void add_starry_night_rows(cairn_bench::Scoreboard& board);
 
 }  // namespace stereo_slam_bench
