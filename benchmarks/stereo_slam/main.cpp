@@ -6,7 +6,7 @@
 /// on recorded drives, time, and what a map costs that lasts. CAIRN_ARENA_SEEDS says how many seeds (3; a
 /// script of a new seed is rendered first, which takes minutes), CAIRN_VIDEO_MINUTES how long the arena is
 /// looped (6; an hour is 60, and takes a quarter of one), CAIRN_STEREO_ROWS which rows are wanted, by
-/// commas: arena,drives,relocalisation,rate,stores,video (all).
+/// commas: arena,drives,return,drift,relocalisation,rate,stores,starry_night,video (all).
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -32,6 +32,7 @@
 #include "pipeline.hpp"
 #include "reference_mounting.hpp"
 #include "saved_map.hpp"
+#include "starry_night.hpp"
 #include "summary.hpp"
 #include "support/scoreboard.hpp"
 #include "there_and_back.hpp"
@@ -401,6 +402,7 @@ int main(int argc, char** argv) {
   if (wanted("return")) add_return_row(board);
   if (wanted("drift")) add_drift_row(board);
   if (wanted("relocalisation")) add_relocalisation_rows(board);
+  if (wanted("starry_night")) stereo_slam_bench::add_starry_night_rows(board);
   if (wanted("rate")) add_rate_row(board);
   if (wanted("stores")) stereo_slam_bench::add_store_rows(board);
   return board.finish();

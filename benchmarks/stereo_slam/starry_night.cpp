@@ -1,0 +1,326 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "starry_night.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include <cairn/io/text.hpp>
+
+#ifdef CAIRN_BENCH_ZLIB
+#include <cstdint>
+#include <iostream>
+#include <map>
+#include <vector>
+
+#include <cairn/core/statistics.hpp>
+#include <cairn/eval/consistency.hpp>
+#include <cairn/filter/differentiate.hpp>
+#include <cairn/filter/extended.hpp>
+#include <cairn/filter/gaussian.hpp>
+#include <cairn/geometry/alignment.hpp>
+#include <cairn/geometry/triangulation.hpp>
+#include <cairn/slam/keyframe_map.hpp>
+
+#include "support/data.hpp"
+#include "support/mat_file.hpp"
+#endif
+
+namespace stereo_slam_bench {
+namespace {
+
+/// Errors against the truth, root mean square over the frames.
+struct PathErrors {
+  double position = 0;  ///< [m]
+  double angle = 0;     ///< [rad]
+};
+
+struct Outcome {
+  PathErrors estimate, dead_reckoning;
+  double pose_nees = 0;      ///< mean over all frames, of 6
+  double landmark_nees = 0;  ///< mean over the dots at the end, of 3
+  double landmark_rmse = 0;  ///< [m]
+  std::size_t landmarks = 0, frames = 0, located = 0, keyframes = 0, first = 0;
+};
+
+#ifdef CAIRN_BENCH_ZLIB
+
+using cairn::Matrix;
+using cairn::SE3;
+using cairn::Vector;
+
+constexpr std::size_t steps = 1900, dots = 20, enough_for_a_pose = 3;
+
+template <int N>
+Vector<N> column(const cairn_test::MatArray& a, std::size_t k) {
+  Vector<N> v;
+  for (int i = 0; i < N; ++i) v(i) = a(static_cast<std::size_t>(i), k);
+  return v;
+}
+
+/// The record, as a camera sees it: all poses and motions are the left camera's.
+class Record {
+public:
+  explicit Record(std::map<std::string, cairn_test::MatArray> arrays) : arrays_(std::move(arrays)) {
+    Matrix<3> R_vehicle_camera;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j)
+        R_vehicle_camera(j, i) = of("C_c_v")(static_cast<std::size_t>(i), static_cast<std::size_t>(j));
+    T_vehicle_camera_ = {cairn::SO3::from_matrix(R_vehicle_camera), column<3>(of("rho_v_c_v"), 0)};
+    cairn::PinholeParameters p;
+    p.fx = of("fu").numbers[0];
+    p.fy = of("fv").numbers[0];
+    p.cx = of("cu").numbers[0];
+    p.cy = of("cv").numbers[0];
+    rig.left = rig.right = cairn::PinholeCamera(p);
+    rig.T_left_right = {{}, {of("b").numbers[0], 0, 0}};
+    sigma_ = std::sqrt(column<4>(of("y_var"), 0).mean());
+  }
+
+  /// What the image of step k shows.
+  [[nodiscard]] std::vector<cairn::StereoSighting> sightings(std::size_t k) const {
+    std::vector<cairn::StereoSighting> result;
+    for (std::uint32_t dot = 0; dot < dots; ++dot) {
+      const double* const y = &of("y_k_j").numbers[4 * (steps * dot + k)];
+      if (y[0] >= 0) result.push_back({dot, {y[0], y[1]}, {y[2], y[3]}, sigma_});
+    }
+    return result;
+  }
+  [[nodiscard]] SE3 truth(std::size_t k) const {
+    const SE3 T_world_vehicle(cairn::SO3::exp(column<3>(of("theta_vk_i"), k)), column<3>(of("r_i_vk_i"), k));
+    return T_world_vehicle * T_vehicle_camera_;
+  }
+  [[nodiscard]] Vector<3> true_dot(std::size_t dot) const { return column<3>(of("rho_i_pj_i"), dot); }
+
+  /// Motion from step k - 1 to step k by the velocities measured, and its covariance, of a right step. They
+  /// are held until the next reading, in which time a hand changes them by about 1 m/s^2 and 4 rad/s^2.
+  [[nodiscard]] SE3 motion(std::size_t k, Matrix<6>& covariance) const {
+    const double dt = of("t").numbers[k] - of("t").numbers[k - 1];
+    Vector<6> velocity, variance, acceleration;
+    velocity << column<3>(of("v_vk_vk_i"), k - 1), column<3>(of("w_vk_vk_i"), k - 1);
+    variance << column<3>(of("v_var"), 0), column<3>(of("w_var"), 0);
+    acceleration << Vector<3>::Constant(1.0), Vector<3>::Constant(4.0);
+    const Vector<6> Q = dt * dt * variance + (0.5 * dt * dt * acceleration).cwiseAbs2();
+    const Matrix<6> J = T_vehicle_camera_.inverse().adjoint();
+    covariance = J * Q.asDiagonal() * J.transpose();
+    return T_vehicle_camera_.inverse() * SE3::exp(Vector<6>(dt * velocity)) * T_vehicle_camera_;
+  }
+
+  cairn::StereoRig rig;
+
+private:
+  [[nodiscard]] const cairn_test::MatArray& of(const std::string& name) const { return arrays_.at(name); }
+
+  std::map<std::string, cairn_test::MatArray> arrays_;
+  SE3 T_vehicle_camera_;
+  double sigma_ = 0;
+};
+
+/// Where an image was taken: near `guess`, or near where the known dots in it put it. Nothing where that is
+/// not determined.
+std::optional<cairn::MapLocation> locate(cairn::KeyframeMap& map, const SE3& guess,
+                                         const std::vector<cairn::StereoSighting>& seen) {
+  const cairn::Triangulator triangulate(map.rig());
+  std::vector<Vector<3>> here, there;
+  for (const cairn::StereoSighting& s : seen) {
+    const auto dot = map.landmark(s.landmark);
+    const cairn::Triangulation point = triangulate(s.left, s.right, s.sigma, s.sigma);
+    if (!dot || !point.good()) continue;
+    here.push_back(point.point);
+    there.push_back(dot->mean);
+  }
+  if (here.size() < enough_for_a_pose) return std::nullopt;
+  cairn::MapLocation best = map.locate(guess, seen);
+  if (!best.good() || 2 * best.inlier_count <= here.size())
+    if (const cairn::Alignment aligned = cairn::align_points(here, there); aligned.good()) {
+      const cairn::MapLocation other = map.locate(aligned.T_target_source, seen);
+      if (other.good() && (!best.good() || other.inlier_count > best.inlier_count)) best = other;
+    }
+  if (!best.good()) return std::nullopt;
+  return best;
+}
+
+/// One dot of the map in both images, as a measurement of the camera's pose. [pixels]
+struct DotView {
+  using State = SE3;
+  using Measurement = Vector<4>;
+
+  const cairn::StereoRig* rig;
+  cairn::Gaussian<Vector<3>> dot;  // in the world
+  double sigma;
+
+  [[nodiscard]] Vector<4> predict(const SE3& T_world_camera) const {
+    // Where it is behind the camera, so far out of the image that no gate lets it through.
+    return rig->project(T_world_camera.inverse() * dot.mean).value_or(Vector<4>::Constant(1e6));
+  }
+  [[nodiscard]] Matrix<4> noise(const SE3& T_world_camera) const {
+    Matrix<4> R = sigma * sigma * Matrix<4>::Identity();
+    const SE3 T_camera_world = T_world_camera.inverse();
+    if (const auto seen = rig->project_with_jacobian(T_camera_world * dot.mean)) {
+      const Matrix<4, 3> J = seen->J_point * T_camera_world.rotation().matrix();
+      R += J * dot.covariance * J.transpose();
+    }
+    return R;
+  }
+};
+
+/// What one or two dots say of a pose that they do not determine.
+void correct(cairn::Gaussian<SE3>& camera, cairn::KeyframeMap& map,
+             const std::vector<cairn::StereoSighting>& seen) {
+  const cairn::Extended filter{.gate = cairn::chi_square_quantile(0.9999, 4)};
+  for (const cairn::StereoSighting& s : seen) {
+    const auto dot = map.landmark_in_world(s.landmark);
+    if (!dot) continue;
+    const DotView view{&map.rig(), *dot, s.sigma};
+    const Vector<4> pixels = (Vector<4>() << s.left, s.right).finished();
+    static_cast<void>(filter.update(camera, cairn::numeric(view), pixels));  // refused: it stays
+  }
+}
+
+class Errors {
+public:
+  void add(const Vector<6>& error) {
+    position_.add(error.head<3>().squaredNorm());
+    angle_.add(error.tail<3>().squaredNorm());
+  }
+  [[nodiscard]] PathErrors rmse() const { return {std::sqrt(position_.mean()), std::sqrt(angle_.mean())}; }
+
+private:
+  cairn::RunningMoments position_, angle_;
+};
+
+Outcome map_and_follow(const Record& record) {
+  Outcome outcome;
+  while (record.sightings(outcome.first).size() < enough_for_a_pose) ++outcome.first;
+  cairn::KeyframeMapOptions options;
+  options.min_matches = enough_for_a_pose;
+  cairn::KeyframeMap map(record.rig, options);
+  const auto add_new = [&](const std::vector<cairn::StereoSighting>& seen) {
+    for (const cairn::StereoSighting& s : seen)
+      if (!map.contains(s.landmark)) map.add_landmark(s);
+  };
+  map.begin(SE3());
+  add_new(record.sightings(outcome.first));
+
+  const SE3 T_camera_truth = record.truth(outcome.first).inverse();
+  SE3 T, reckoned;  // the first camera is the world
+  Matrix<6> P = Matrix<6>::Zero(), claimed;
+  double best_share = 0;
+  Errors estimate, dead_reckoning;
+  cairn::RunningMoments nees;
+  for (std::size_t k = outcome.first + 1; k < steps; ++k) {
+    Matrix<6> Q;
+    const SE3 motion = record.motion(k, Q);
+    reckoned = reckoned * motion;
+    T = T * motion;
+    const Matrix<6> F = motion.inverse().adjoint();
+    P = F * P * F.transpose() + Q;
+    const std::vector<cairn::StereoSighting> seen = record.sightings(k);
+    if (const auto here = locate(map, T, seen)) {
+      ++outcome.located;
+      T = here->T_world_camera;
+      P = claimed = here->covariance;
+      // Keyframes by the rule of the pipeline (examples/stereo_slam/pipeline.hpp)
+      constexpr double keyframe_share = 0.8;
+      const double share = static_cast<double>(here->inlier_count) / static_cast<double>(seen.size());
+      best_share = std::max(best_share, share);
+      if (share < keyframe_share * best_share && map.add_keyframe(*here, seen)) {
+        add_new(seen);
+        best_share = 0;
+      }
+    } else {
+      // The pose goes on from there, but its covariance as if it had not been: the errors of a dot are the
+      // same from image to image, and would be counted again in every one.
+      cairn::Gaussian<SE3> camera{T, P};
+      correct(camera, map, seen);
+      T = camera.mean;
+      claimed = camera.covariance;
+    }
+    const SE3 truth = T_camera_truth * record.truth(k);
+    const Vector<6> error = cairn::local(T, truth);
+    estimate.add(error);
+    dead_reckoning.add(cairn::local(reckoned, truth));
+    if (const auto one = cairn::normalised_squared(error, claimed)) nees.add(*one);
+    ++outcome.frames;
+  }
+  outcome.estimate = estimate.rmse();
+  outcome.dead_reckoning = dead_reckoning.rmse();
+  outcome.pose_nees = nees.mean();
+  outcome.keyframes = map.keyframe_count();
+  cairn::RunningMoments squared, dot_nees;
+  for (const std::uint32_t dot : map.landmark_ids()) {
+    const auto known = map.landmark_in_world(dot);
+    if (!known) continue;
+    ++outcome.landmarks;
+    const Vector<3> error = T_camera_truth * record.true_dot(dot) - known->mean;
+    squared.add(error.squaredNorm());
+    if (const auto one = cairn::normalised_squared(error, known->covariance)) dot_nees.add(*one);
+  }
+  outcome.landmark_rmse = std::sqrt(squared.mean());
+  outcome.landmark_nees = dot_nees.mean();
+  return outcome;
+}
+
+std::optional<Outcome> run() {
+  const auto path = cairn_test::real_data("starry_night_stereo/dataset3.mat");
+  if (!path) return std::nullopt;
+  std::cout << "running starry_night_stereo" << std::endl;
+  return map_and_follow(Record(cairn_test::read_mat(*path)));
+}
+
+#else
+
+std::optional<Outcome> run() {
+  return std::nullopt;
+}
+
+#endif
+
+}  // namespace
+
+void add_starry_night_rows(cairn_bench::Scoreboard& board) {
+  const std::optional<Outcome> done = run();
+  const auto add = [&](cairn_bench::Row row, auto&& number) {
+    row.name = "starry_night_stereo, whole record: " + row.name;
+    if (done)
+      row.measured = number(*done);
+    else
+      row.note = "no data";
+    board.add(std::move(row));
+  };
+  const auto text = [](double value) { return cairn::shortest(std::round(1e3 * value) / 1e3); };
+  const auto off = [](double nees, double due) { return std::max(nees / due, due / nees); };
+  std::array<std::string, 4> notes;
+  if (done) {
+    notes[0] = text(done->estimate.position) + " for " + text(done->dead_reckoning.position) +
+               " m RMSE from step " + std::to_string(done->first + 1) + ", " + std::to_string(done->located) +
+               " of " + std::to_string(done->frames) + " frames located";
+    notes[1] = text(done->estimate.angle) + " for " + text(done->dead_reckoning.angle) + " rad RMSE";
+    notes[2] = text(done->pose_nees) + " of 6; " + std::to_string(done->keyframes) + " keyframes";
+    notes[3] = text(done->landmark_nees) + " of 3; " + std::to_string(done->landmarks) +
+               " of 20 mapped, RMSE " + text(done->landmark_rmse) + " m";
+  }
+  add({.name = "position better than dead reckoning",
+       .unit = "times",
+       .must = 5,
+       .better = cairn_bench::larger,
+       .note = notes[0]},
+      [](const Outcome& o) { return o.dead_reckoning.position / o.estimate.position; });
+  add({.name = "attitude better than dead reckoning",
+       .unit = "times",
+       .must = 5,
+       .better = cairn_bench::larger,
+       .note = notes[1]},
+      [](const Outcome& o) { return o.dead_reckoning.angle / o.estimate.angle; });
+  add({.name = "NEES of the pose, off 6 either way", .unit = "times", .must = 2, .note = notes[2]},
+      [&](const Outcome& o) { return off(o.pose_nees, 6); });
+  add({.name = "NEES of the landmarks, off 3 either way", .unit = "times", .must = 2, .note = notes[3]},
+      [&](const Outcome& o) { return off(o.landmark_nees, 3); });
+}
+
+}  // namespace stereo_slam_bench
