@@ -6,7 +6,7 @@
 /// on recorded drives, time, and what a map costs that lasts. CAIRN_ARENA_SEEDS says how many seeds (3; a
 /// script of a new seed is rendered first, which takes minutes), CAIRN_VIDEO_MINUTES how long the arena is
 /// looped (6; an hour is 60, and takes a quarter of one), CAIRN_STEREO_ROWS which rows are wanted, by
-/// commas: arena,drives,return,drift,relocalisation,rate,stores,starry_night,video (all).
+/// commas: arena,joint,drives,return,drift,relocalisation,rate,stores,starry_night,video (all).
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -28,6 +28,7 @@
 #include "arena_dataset.hpp"
 #include "arena_script.hpp"
 #include "dataset.hpp"
+#include "joint.hpp"
 #include "lasting.hpp"
 #include "pipeline.hpp"
 #include "reference_mounting.hpp"
@@ -394,6 +395,7 @@ int main(int argc, char** argv) {
   if (wanted("video"))
     stereo_slam_bench::add_hour_rows(board, 600 * video_minutes());  // its memory is ours: first
   if (wanted("arena")) add_arena_rows(board);
+  if (wanted("joint")) stereo_slam_bench::add_joint_rows(board);
   for (const auto calibrate : {stereo_slam::Calibration::automatic, stereo_slam::Calibration::off}) {
     if (!wanted("drives")) break;
     add_odometry_rows(board, calibrate);

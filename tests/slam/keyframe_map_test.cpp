@@ -518,6 +518,16 @@ TEST_SUITE("keyframe_map") {
     REQUIRE(map.add_keyframe(map.locate(s.poses[0], s.seen[0]), s.seen[0]));
     REQUIRE(map.add_keyframe(map.locate(s.poses[0], s.seen[0]), s.seen[0]));
     CHECK(map.landmark_count() == 40);
+    const auto list = map.sightings_of(7);
+    REQUIRE(list.size() == 6);
+    for (std::size_t k = 0; k < 6; ++k) {
+      CHECK(list[k].keyframe == k);
+      CHECK(list[k].sighting.landmark == 7);
+      CHECK(list[k].sighting.left == s.seen[0][7].left);
+      CHECK(list[k].sighting.right == s.seen[0][7].right);
+    }
+    CHECK(list[0].sighting.sigma == s.seen[0][7].sigma);
+    CHECK(map.sightings_of(40).empty());
     // Then they are spent.
     const auto here = map.locate(s.poses[0], s.seen[0]);
     REQUIRE(map.add_keyframe(here, s.seen[0]));

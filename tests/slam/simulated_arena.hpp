@@ -156,6 +156,7 @@ struct ArenaRun {
   cairn::Vector<6> last_error = cairn::Vector<6>::Zero();  ///< of the last pose that was found, its own axes
   cairn::Matrix<6> last_covariance = cairn::Matrix<6>::Zero();
   std::vector<double> nees;
+  std::vector<double> off;             ///< how far each pose is from the true one [m]
   std::vector<std::size_t> keyframes;  ///< after each frame
   double rms_position = 0;
   int lost = 0;
@@ -206,6 +207,7 @@ inline ArenaRun run_arena(const std::vector<ArenaFrame>& frames, cairn::Keyframe
     run.nees.push_back(cairn::normalised_squared(error, here.covariance).value());
     run.last_error = error;
     run.last_covariance = here.covariance;
+    run.off.push_back(error.head<3>().norm());
     squares += error.head<3>().squaredNorm();
     const double share =
         static_cast<double>(unknown.size()) / static_cast<double>(frames[f].sightings.size());

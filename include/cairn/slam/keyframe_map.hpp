@@ -85,6 +85,12 @@ struct KeyframeMapOptions {
       9;  ///< a keyframe learns from lists that may grow unless its variance is so much larger
 };
 
+/// A sighting that a landmark of the map follows from, with the keyframe that saw it (0 the first of all).
+struct KeyframeSighting {
+  std::size_t keyframe = 0;
+  StereoSighting sighting;  ///< its sigma holds the robust weight it was used with
+};
+
 namespace detail {
 struct KeyframeMapFile;
 }
@@ -174,6 +180,19 @@ public:
         P += product_transposed(product(found->F[a], transposed(both)), found->F[b]);
       }
     return Gaussian<Vector<3>>{found->x, pose_factor_ * symmetrised(P)};
+  }
+  /// All that a landmark follows from, by keyframes: with keyframe_pose(), the data of the joint least
+  /// squares problem whose solution the map approximates. Empty for a landmark that is not there.
+  [[nodiscard]] std::vector<KeyframeSighting> sightings_of(std::uint32_t landmark) const {
+    std::vector<KeyframeSighting> result;
+    const auto found = place_.find(landmark);
+    if (found == place_.end()) return result;
+    const detail::KeyframeLandmark& one = landmarks_[found->second];
+    for (std::size_t i = 0; i < one.count; ++i) {
+      const detail::RecordedSighting& s = one.sightings[i];
+      result.push_back({s.keyframe, {landmark, s.left, s.right, s.sigma}});
+    }
+    return result;
   }
   /// The landmarks that the keyframes of these landmarks saw: what should be in view as well. Ascending.
   [[nodiscard]] std::vector<std::uint32_t> seen_with(std::span<const std::uint32_t> ids) const {
