@@ -4,6 +4,9 @@
 
 #include <vector>
 
+#include <cairn/geometry/alignment.hpp>
+#include <cairn/geometry/triangulation.hpp>
+
 #ifdef CAIRN_BENCH_OPENCV_CALIB3D
 #include <opencv2/calib3d.hpp>
 #endif

@@ -34,3 +34,20 @@
 #else
 #define CAIRN_ABI v0_1
 #endif
+
+// Target cairn::compiled says CAIRN_COMPILED, which is the CAIRN_CHECKED that it was built with: it holds
+// what the headers declare CAIRN_INLINE and CAIRN_INSTANCE, and such a program does not compile that again. A
+// program with other checks, or for wider registers (Eigen then aligns its numbers otherwise), goes without
+// it.
+#if defined(CAIRN_COMPILING)  // the library itself
+#define CAIRN_INSTANCE template
+#define CAIRN_INLINE
+#define CAIRN_ELSEWHERE 0
+#elif defined(CAIRN_COMPILED) && CAIRN_COMPILED + 0 == CAIRN_CHECKED && !defined(__AVX__)
+#define CAIRN_INSTANCE extern template
+#define CAIRN_INLINE
+#define CAIRN_ELSEWHERE 1
+#else
+#define CAIRN_INLINE inline
+#define CAIRN_ELSEWHERE 0
+#endif

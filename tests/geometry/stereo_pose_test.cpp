@@ -11,6 +11,7 @@
 
 #include <cairn/core/random.hpp>
 #include <cairn/core/statistics.hpp>
+#include <cairn/geometry/detail/stereo_pose_problem.hpp>
 #include <cairn/geometry/stereo_pose.hpp>
 #include <cairn/manifold/derivatives.hpp>
 

@@ -23,15 +23,17 @@
 #include <vector>
 
 #include <cairn/core/linalg.hpp>
-#include <cairn/geometry/detail/pose_equations.hpp>
-#include <cairn/geometry/detail/stereo_pose_problem.hpp>
-#include <cairn/geometry/detail/stereo_residual.hpp>
-#include <cairn/geometry/ransac.hpp>
 #include <cairn/geometry/stereo_match.hpp>
 #include <cairn/geometry/stereo_pose_options.hpp>
 #include <cairn/geometry/stereo_rig.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
+
+#if !CAIRN_ELSEWHERE  // else cairn::compiled holds what needs these
+#include <cairn/geometry/detail/pose_equations.hpp>
+#include <cairn/geometry/detail/stereo_pose_problem.hpp>
+#include <cairn/geometry/ransac.hpp>
+#endif
 
 namespace cairn { inline namespace CAIRN_ABI {
 
@@ -70,6 +72,20 @@ struct StereoPose {
   [[nodiscard]] bool good() const noexcept { return status == StereoPoseStatus::good; }
 };
 
+/// Pose of the left camera from matches of which any part may be wrong. Throws Error where a number is not
+/// finite, naming the match or the prior. Deterministic in its arguments.
+[[nodiscard]] StereoPose estimate_stereo_pose(const StereoRig& rig, std::span<const StereoMatch> matches,
+                                              const StereoPoseOptions& options = {},
+                                              const std::optional<PosePrior>& prior = std::nullopt);
+
+/// The same without sampling: reweighted Gauss-Newton from a pose that is already about right, for example on
+/// the earliest landmarks of a result only.
+[[nodiscard]] StereoPose refine_stereo_pose(const StereoRig& rig, std::span<const StereoMatch> matches,
+                                            const SE3& start, const StereoPoseOptions& options = {},
+                                            const std::optional<PosePrior>& prior = std::nullopt);
+
+#if !CAIRN_ELSEWHERE
+
 namespace detail {
 
 /// Reweighted Gauss-Newton to convergence from `pose`, then verdict, covariance and mask.
@@ -101,12 +117,9 @@ inline void finish_stereo_pose(const StereoPoseProblem& problem, SE3 pose, const
 
 }  // namespace detail
 
-/// Pose of the left camera from matches of which any part may be wrong. Throws Error where a number is not
-/// finite, naming the match or the prior. Deterministic in its arguments.
-[[nodiscard]] inline StereoPose estimate_stereo_pose(const StereoRig& rig,
-                                                     std::span<const StereoMatch> matches,
-                                                     const StereoPoseOptions& options = {},
-                                                     const std::optional<PosePrior>& prior = std::nullopt) {
+CAIRN_INLINE StereoPose estimate_stereo_pose(const StereoRig& rig, std::span<const StereoMatch> matches,
+                                             const StereoPoseOptions& options,
+                                             const std::optional<PosePrior>& prior) {
   const detail::StereoPoseProblem problem(rig, matches, options, prior);
   StereoPose result;
   result.inliers.assign(matches.size(), 0);
@@ -122,11 +135,9 @@ inline void finish_stereo_pose(const StereoPoseProblem& problem, SE3 pose, const
   return result;
 }
 
-/// The same without sampling: reweighted Gauss-Newton from a pose that is already about right, for example on
-/// the earliest landmarks of a result only.
-[[nodiscard]] inline StereoPose refine_stereo_pose(const StereoRig& rig, std::span<const StereoMatch> matches,
-                                                   const SE3& start, const StereoPoseOptions& options = {},
-                                                   const std::optional<PosePrior>& prior = std::nullopt) {
+CAIRN_INLINE StereoPose refine_stereo_pose(const StereoRig& rig, std::span<const StereoMatch> matches,
+                                           const SE3& start, const StereoPoseOptions& options,
+                                           const std::optional<PosePrior>& prior) {
   detail::check_start(start, Matrix<6>::Zero());
   const detail::StereoPoseProblem problem(rig, matches, options, prior);
   StereoPose result;
@@ -137,5 +148,7 @@ inline void finish_stereo_pose(const StereoPoseProblem& problem, SE3 pose, const
   if (problem.refine(pose)) detail::finish_stereo_pose(problem, pose, options, result);
   return result;
 }
+
+#endif
 
 }}  // namespace cairn::CAIRN_ABI

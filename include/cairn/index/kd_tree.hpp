@@ -192,29 +192,13 @@ private:
     return ids;
   }
 
-  KdTree(std::vector<Scalar> rows, std::span<const PointId> ids, std::size_t dim, M metric, unsigned threads)
-      : metric_(std::move(metric)), dim_(dim) {
-    if (rows.empty()) return;
-    detail::check_metric(metric_, dimension());
-    if constexpr (detail::HasPeriods<M>) {
-      static_assert(std::floating_point<Scalar>, "coordinates on circles must be floating point numbers");
-      rows = detail::wrapped_rows(metric_, dimension(), std::move(rows));
-    }
-    detail::KdBuilder<Scalar, Dim> builder(dimension());
-    builder.take(std::move(rows), ids, threads);
-    parts_ = builder.finish(threads);
-  }
+  KdTree(std::vector<Scalar> rows, std::span<const PointId> ids, std::size_t dim, M metric, unsigned threads);
 
   [[nodiscard]] bool use_boxes() const noexcept { return dimension() <= detail::few_axes; }
 
   /// Exact search for checked numbers.
   template <class C>
-  void search_row(const Real* row, C& collector, Work& work) const {
-    constexpr bool may_be_few = Dim == dynamic_dim || Dim <= detail::few_axes;
-    if constexpr (may_be_few)
-      if (Dim != dynamic_dim || use_boxes()) return search_boxes(row, collector, work);
-    if constexpr (!may_be_few || Dim == dynamic_dim) search_splits(row, collector, work);
-  }
+  void search_row(const Real* row, C& collector, Work& work) const;
   template <class C>
   void search_boxes(const Real* row, C& collector, Work& work) const {
     detail::with_widest_lanes([&]() CAIRN_INLINED {
@@ -263,6 +247,31 @@ private:
   detail::KdParts<Scalar> parts_;
 };
 
+// Outside of the class, and so not inline: cairn::compiled may hold them (below).
+template <class Scalar, std::size_t Dim, class M>
+KdTree<Scalar, Dim, M>::KdTree(std::vector<Scalar> rows, std::span<const PointId> ids, std::size_t dim,
+                               M metric, unsigned threads)
+    : metric_(std::move(metric)), dim_(dim) {
+  if (rows.empty()) return;
+  detail::check_metric(metric_, dimension());
+  if constexpr (detail::HasPeriods<M>) {
+    static_assert(std::floating_point<Scalar>, "coordinates on circles must be floating point numbers");
+    rows = detail::wrapped_rows(metric_, dimension(), std::move(rows));
+  }
+  detail::KdBuilder<Scalar, Dim> builder(dimension());
+  builder.take(std::move(rows), ids, threads);
+  parts_ = builder.finish(threads);
+}
+
+template <class Scalar, std::size_t Dim, class M>
+template <class C>
+void KdTree<Scalar, Dim, M>::search_row(const Real* row, C& collector, Work& work) const {
+  constexpr bool may_be_few = Dim == dynamic_dim || Dim <= detail::few_axes;
+  if constexpr (may_be_few)
+    if (Dim != dynamic_dim || use_boxes()) return search_boxes(row, collector, work);
+  if constexpr (!may_be_few || Dim == dynamic_dim) search_splits(row, collector, work);
+}
+
 namespace detail {
 
 template <class Tree>
@@ -285,3 +294,33 @@ KdTree(const Points&, const Ids&, M = {}, BuildOptions = {})
     -> KdTree<detail::CoordinateOf<Points>, dynamic_dim, M>;
 
 }}  // namespace cairn::CAIRN_ABI
+
+// What cairn::compiled holds: trees of float and double, of two, three and any number of coordinates, and
+// their exact search with each collector of the library. It is what compiles longest; the rest is inlined
+// anyway.
+#ifdef CAIRN_INSTANCE
+
+namespace cairn { inline namespace CAIRN_ABI {
+
+#define CAIRN_SEARCHES_OF_KD_TREE(Scalar, Dim, ...) \
+  CAIRN_INSTANCE void KdTree<Scalar, Dim>::search_row(const Scalar*, __VA_ARGS__&, Work&) const;
+#define CAIRN_KD_TREE(Scalar, Dim)                                                                           \
+  CAIRN_INSTANCE KdTree<Scalar, Dim>::KdTree(std::vector<Scalar>, std::span<const PointId>, std::size_t, L2, \
+                                             unsigned);                                                      \
+  CAIRN_SEARCHES_OF_KD_TREE(Scalar, Dim, Nearest<Scalar>)                                                    \
+  CAIRN_SEARCHES_OF_KD_TREE(Scalar, Dim, KNearest<Scalar>)                                                   \
+  CAIRN_SEARCHES_OF_KD_TREE(Scalar, Dim, Within<Scalar>)
+
+CAIRN_KD_TREE(float, dynamic_dim)
+CAIRN_KD_TREE(float, 2)
+CAIRN_KD_TREE(float, 3)
+CAIRN_KD_TREE(double, dynamic_dim)
+CAIRN_KD_TREE(double, 2)
+CAIRN_KD_TREE(double, 3)
+
+#undef CAIRN_KD_TREE
+#undef CAIRN_SEARCHES_OF_KD_TREE
+
+}}  // namespace cairn::CAIRN_ABI
+
+#endif

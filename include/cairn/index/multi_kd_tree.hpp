@@ -309,3 +309,35 @@ private:
 MultiKdTree(MultiTreeShape = {}) -> MultiKdTree<detail::Unsaid>;
 
 }}  // namespace cairn::CAIRN_ABI
+
+// What cairn::compiled holds: what merges and what searches the trees that it holds (kd_tree.hpp).
+#ifdef CAIRN_INSTANCE
+
+namespace cairn { inline namespace CAIRN_ABI { namespace detail {
+
+#define CAIRN_SEARCH_IN_STEP(Scalar, Dim, ...)                                                   \
+  CAIRN_INSTANCE void search_in_step(std::span<const KdTree<Scalar, Dim>* const>, const Scalar*, \
+                                     OnlyLive<Scalar, __VA_ARGS__>&, Work&);
+#define CAIRN_MULTI_KD_TREE(Scalar, Dim)                                                            \
+  CAIRN_INSTANCE void LogarithmicForest<KdTree<Scalar, Dim>>::add(NewPoints<Scalar>, const Facts&); \
+  CAIRN_INSTANCE void LogarithmicForest<KdTree<Scalar, Dim>>::advance(std::uint64_t);               \
+  CAIRN_INSTANCE void LogarithmicForest<KdTree<Scalar, Dim>>::shrink(const Facts&);                 \
+  CAIRN_INSTANCE void LogarithmicForest<KdTree<Scalar, Dim>>::rebuild(const Facts&);                \
+  CAIRN_INSTANCE void LogarithmicForest<KdTree<Scalar, Dim>>::finish_merges();                      \
+  CAIRN_SEARCH_IN_STEP(Scalar, Dim, Nearest<Scalar>)                                                \
+  CAIRN_SEARCH_IN_STEP(Scalar, Dim, KNearest<Scalar>)                                               \
+  CAIRN_SEARCH_IN_STEP(Scalar, Dim, Within<Scalar>)
+
+CAIRN_MULTI_KD_TREE(float, dynamic_dim)
+CAIRN_MULTI_KD_TREE(float, 2)
+CAIRN_MULTI_KD_TREE(float, 3)
+CAIRN_MULTI_KD_TREE(double, dynamic_dim)
+CAIRN_MULTI_KD_TREE(double, 2)
+CAIRN_MULTI_KD_TREE(double, 3)
+
+#undef CAIRN_MULTI_KD_TREE
+#undef CAIRN_SEARCH_IN_STEP
+
+}}}  // namespace cairn::CAIRN_ABI::detail
+
+#endif

@@ -63,6 +63,33 @@ private:
   int number_;
 };
 
+/// Whether the name still leads to the open file.
+[[nodiscard]] inline bool leads_to(const std::filesystem::path& path, const Descriptor& file) noexcept {
+  struct stat by_name{}, opened{};
+  return ::lstat(path.c_str(), &by_name) == 0 && ::fstat(file.number(), &opened) == 0 &&
+         by_name.st_dev == opened.st_dev && by_name.st_ino == opened.st_ino;
+}
+
+}  // namespace detail
+
+/// All bytes of the file. Throws Error naming the path and `expected` ("a TUM trajectory") when it is
+/// missing, a folder or unreadable.
+[[nodiscard]] std::string read_file(const std::filesystem::path& path, std::string_view expected = "a file");
+
+/// Replaces the file at `path` by `bytes`, or throws Error naming it and why ("No space left on device") and
+/// leaves it as it was.
+///
+/// A file that is there keeps its permissions, and its owner where this process may give files away (then
+/// without set-user and set-group bits otherwise); one that may not be written is refused. Hard links, access
+/// lists and extended attributes stay with the old bytes. A symbolic link stays: what it leads to is
+/// replaced, or made. Devices, pipes and what /proc names are written into as they are, which nothing can
+/// undo; a pipe waits for its reader.
+void write_file_atomically(const std::filesystem::path& path, std::string_view bytes);
+
+#if !CAIRN_ELSEWHERE  // else cairn::compiled holds the rest
+
+namespace detail {
+
 /// Writes all bytes; returns 0 or what errno says.
 [[nodiscard]] inline int write_all(const Descriptor& file, std::string_view bytes) noexcept {
   constexpr std::size_t most_at_once = std::size_t{1} << 30U;
@@ -74,13 +101,6 @@ private:
       return errno;
   }
   return 0;
-}
-
-/// Whether the name still leads to the open file.
-[[nodiscard]] inline bool leads_to(const std::filesystem::path& path, const Descriptor& file) noexcept {
-  struct stat by_name{}, opened{};
-  return ::lstat(path.c_str(), &by_name) == 0 && ::fstat(file.number(), &opened) == 0 &&
-         by_name.st_dev == opened.st_dev && by_name.st_ino == opened.st_ino;
 }
 
 /// Removes a part whose writer is gone, as its lock tells. False where it lives, or is no part of ours.
@@ -172,10 +192,7 @@ private:
 
 }  // namespace detail
 
-/// All bytes of the file. Throws Error naming the path and `expected` ("a TUM trajectory") when it is
-/// missing, a folder or unreadable.
-[[nodiscard]] inline std::string read_file(const std::filesystem::path& path,
-                                           std::string_view expected = "a file") {
+CAIRN_INLINE std::string read_file(const std::filesystem::path& path, std::string_view expected) {
   const auto refuse = [&](const std::string& why) {
     raise(path.string() + ": " + why + "; expected " + std::string(expected));
   };
@@ -191,15 +208,7 @@ private:
   return bytes;
 }
 
-/// Replaces the file at `path` by `bytes`, or throws Error naming it and why ("No space left on device") and
-/// leaves it as it was.
-///
-/// A file that is there keeps its permissions, and its owner where this process may give files away (then
-/// without set-user and set-group bits otherwise); one that may not be written is refused. Hard links, access
-/// lists and extended attributes stay with the old bytes. A symbolic link stays: what it leads to is
-/// replaced, or made. Devices, pipes and what /proc names are written into as they are, which nothing can
-/// undo; a pipe waits for its reader.
-inline void write_file_atomically(const std::filesystem::path& path, std::string_view bytes) {
+CAIRN_INLINE void write_file_atomically(const std::filesystem::path& path, std::string_view bytes) {
   const auto refuse = [&](const std::string& why) {
     raise(path.string() + ": cannot write (" + why + "); expected a file in a writable folder");
   };
@@ -236,5 +245,7 @@ inline void write_file_atomically(const std::filesystem::path& path, std::string
   check(detail::write_all(part.file(), bytes));
   check(part.deliver());
 }
+
+#endif
 
 }}  // namespace cairn::CAIRN_ABI

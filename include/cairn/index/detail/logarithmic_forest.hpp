@@ -56,59 +56,18 @@ public:
 
   /// Puts new points into a tree, together with the trees they pull in; where merges are not done at once,
   /// with the first level's at once and with the others later.
-  void add(NewPoints<Scalar> points, const Facts& facts) {
-    const Range pulled = pulled_in(shape_, resting_sizes(), points.ids.size());
-    std::vector<const Tree*> at_once;
-    Task later;
-    for (std::size_t i = pulled.begin; i < pulled.end; ++i)
-      if (shape_.merging == Merging::at_once || shape_.level_of(resting_[i]->size()) == 0)
-        at_once.push_back(resting_[i].get());
-      else
-        later.sources.push_back(resting_[i]);
-    const TreePointer tree = build(std::move(points), at_once, facts);
-    make_room();
-    if (later.sources.empty()) {
-      drop_resting(pulled);
-      rest(tree);
-    } else {
-      later.sources.push_back(tree);
-      if (facts.live < stored_) later.states = facts.states;
-      const std::size_t count = later.points();
-      start_merge(std::move(later), pulled, count, facts.now);
-    }
-    update_view();
-  }
+  void add(NewPoints<Scalar> points, const Facts& facts);
 
   /// Ends the merges that are due by now and gets on with the others.
-  void advance(std::uint64_t now) {
-    for (std::size_t i = 0; i < merges_.size();)
-      if (merges_[i].is_due(now))
-        end_merge(i);
-      else
-        merges_[i++].advance(now);
-  }
+  void advance(std::uint64_t now);
 
   /// Drops what is erased, at once or in a merge of all.
-  void shrink(const Facts& facts) {
-    if (shape_.merging == Merging::at_once || facts.live <= shape_.first_size)
-      rebuild(facts);
-    else if (merges_.empty())
-      start_merge({resting_, facts.states}, {0, resting_.size()}, facts.live, facts.now);
-  }
+  void shrink(const Facts& facts);
 
   /// Puts all that is not erased into one tree.
-  void rebuild(const Facts& facts) {
-    const TreePointer tree = build({}, view_, facts);
-    make_room();
-    merges_.clear();
-    resting_.clear();
-    rest(tree);
-    update_view();
-  }
+  void rebuild(const Facts& facts);
 
-  void finish_merges() {
-    while (!merges_.empty()) end_merge(0);
-  }
+  void finish_merges();
 
 private:
   using TreePointer = std::shared_ptr<const Tree>;
@@ -204,5 +163,62 @@ private:
   std::size_t stored_ = 0;
   std::uint64_t points_moved_ = 0;
 };
+
+// Outside of the class, and so not inline: cairn::compiled may hold them (multi_kd_tree.hpp).
+template <class Tree>
+void LogarithmicForest<Tree>::add(NewPoints<Scalar> points, const Facts& facts) {
+  const Range pulled = pulled_in(shape_, resting_sizes(), points.ids.size());
+  std::vector<const Tree*> at_once;
+  Task later;
+  for (std::size_t i = pulled.begin; i < pulled.end; ++i)
+    if (shape_.merging == Merging::at_once || shape_.level_of(resting_[i]->size()) == 0)
+      at_once.push_back(resting_[i].get());
+    else
+      later.sources.push_back(resting_[i]);
+  const TreePointer tree = build(std::move(points), at_once, facts);
+  make_room();
+  if (later.sources.empty()) {
+    drop_resting(pulled);
+    rest(tree);
+  } else {
+    later.sources.push_back(tree);
+    if (facts.live < stored_) later.states = facts.states;
+    const std::size_t count = later.points();
+    start_merge(std::move(later), pulled, count, facts.now);
+  }
+  update_view();
+}
+
+template <class Tree>
+void LogarithmicForest<Tree>::advance(std::uint64_t now) {
+  for (std::size_t i = 0; i < merges_.size();)
+    if (merges_[i].is_due(now))
+      end_merge(i);
+    else
+      merges_[i++].advance(now);
+}
+
+template <class Tree>
+void LogarithmicForest<Tree>::shrink(const Facts& facts) {
+  if (shape_.merging == Merging::at_once || facts.live <= shape_.first_size)
+    rebuild(facts);
+  else if (merges_.empty())
+    start_merge({resting_, facts.states}, {0, resting_.size()}, facts.live, facts.now);
+}
+
+template <class Tree>
+void LogarithmicForest<Tree>::rebuild(const Facts& facts) {
+  const TreePointer tree = build({}, view_, facts);
+  make_room();
+  merges_.clear();
+  resting_.clear();
+  rest(tree);
+  update_view();
+}
+
+template <class Tree>
+void LogarithmicForest<Tree>::finish_merges() {
+  while (!merges_.empty()) end_merge(0);
+}
 
 }}}  // namespace cairn::CAIRN_ABI::detail

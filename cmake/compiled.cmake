@@ -1,0 +1,45 @@
+# cairn::compiled: the headers as with cairn::cairn, and a static library of what takes longest to compile (CAIRN_INLINE and
+# CAIRN_INSTANCE in include/cairn): for programs of many files, and for this project's own. Nobody has to link it. It is built where
+# somebody does; with CAIRN_COMPILED in any case, and then it is installed too.
+option(CAIRN_COMPILED "Build and install the library cairn::compiled, and link this project's own programs to it" OFF)
+if(NOT TARGET Eigen3::Eigen)
+  return()
+endif()
+
+# Every file of the library is one door.
+set(compiled_files "")
+foreach(door IN ITEMS geometry/stereo_pose index/multi_kd_tree io/file)
+  set(file "${PROJECT_BINARY_DIR}/compiled/${door}.cpp")
+  file(CONFIGURE OUTPUT "${file}" CONTENT "#include <cairn/${door}.hpp>\n" @ONLY)
+  list(APPEND compiled_files "${file}")
+endforeach()
+
+add_library(cairn_compiled STATIC EXCLUDE_FROM_ALL ${compiled_files})
+add_library(cairn::compiled ALIAS cairn_compiled)
+set_target_properties(cairn_compiled PROPERTIES EXPORT_NAME compiled POSITION_INDEPENDENT_CODE ON UNITY_BUILD OFF)
+if(CAIRN_COMPILED)
+  set_target_properties(cairn_compiled PROPERTIES EXCLUDE_FROM_ALL OFF)
+endif()
+target_link_libraries(cairn_compiled PUBLIC cairn)
+target_compile_definitions(cairn_compiled PRIVATE CAIRN_COMPILING)
+
+# Whether it holds the checked instances is said to whoever links it: a program with other checks makes its own (version.hpp).
+get_property(several_configurations GLOBAL PROPERTY GENERATOR_IS_MULTI_CONFIG)
+set(configurations "${CMAKE_BUILD_TYPE}")
+if(several_configurations)
+  set(configurations ${CMAKE_CONFIGURATION_TYPES})
+endif()
+foreach(configuration IN LISTS configurations)
+  string(TOUPPER "${configuration}" upper)
+  set(checked 1)
+  if("${CMAKE_CXX_FLAGS} ${CMAKE_CXX_FLAGS_${upper}}" MATCHES "-DNDEBUG")
+    set(checked 0)
+  endif()
+  set(if_configuration "$<CONFIG:${configuration}>")
+  target_compile_definitions(cairn_compiled PRIVATE "$<${if_configuration}:CAIRN_CHECKED=${checked}>")
+  if(several_configurations)
+    target_compile_definitions(cairn_compiled INTERFACE "$<${if_configuration}:CAIRN_COMPILED=${checked}>")
+  else()
+    target_compile_definitions(cairn_compiled INTERFACE "CAIRN_COMPILED=${checked}")
+  endif()
+endforeach()
