@@ -120,4 +120,31 @@ std::vector<SE2> conditioned(const StepChain& chain, const std::vector<Loop>& lo
   return poses_of(moved);
 }
 
+StepChain drawn_steps(const std::vector<cairn::PathPose<SE2>>& path) {
+  // A match that is surer than this is a match to what was seen a moment ago.
+  const Matrix<3> least = Vector<3>(9e-6, 9e-6, 1e-6).asDiagonal();
+  StepChain chain{path.front().pose, {}, {}};
+  for (std::size_t k = 1; k < path.size(); ++k) {
+    chain.steps.push_back(path[k].before.inverse() * path[k].drawn);
+    chain.covariances.push_back(path[k].drawn_from.covariance + least);
+  }
+  return chain;
+}
+
+std::vector<cairn::PathPose<SE2>> moved_by(std::vector<cairn::PathPose<SE2>> path,
+                                           const std::vector<Loop>& loops, cairn::Random& random) {
+  CAIRN_EXPECTS(!path.empty(), "moved_by needs a path");
+  std::vector<Vector<3>> noise;
+  for (const Loop& loop : loops) {
+    const Vector<3> v(random.normal(), random.normal(), random.normal());
+    noise.emplace_back(cairn::Cholesky<3>(loop.covariance).lower() * v);
+  }
+  const std::vector<SE2> moved = conditioned(drawn_steps(path), loops, noise);
+  for (std::size_t k = 0; k < moved.size(); ++k) {
+    path[k].drawn_from.mean = moved[k] * (path[k].pose.inverse() * path[k].drawn_from.mean);
+    path[k].pose = moved[k];
+  }
+  return path;
+}
+
 }  // namespace grid_slam

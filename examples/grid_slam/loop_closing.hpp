@@ -17,6 +17,8 @@
 #include <vector>
 
 #include <cairn/core/linalg.hpp>
+#include <cairn/core/random.hpp>
+#include <cairn/filter/conditional.hpp>
 #include <cairn/manifold/se2.hpp>
 
 namespace grid_slam {
@@ -47,5 +49,15 @@ struct StepChain {
 /// Gauss-Newton. The chain as it is where the loops' matrix is not positive definite.
 [[nodiscard]] std::vector<cairn::SE2> conditioned(const StepChain& chain, const std::vector<Loop>& loops,
                                                   const std::vector<cairn::Vector<3>>& noise);
+
+/// The steps of a particle's path as they were drawn, with the covariances of what they were drawn from.
+[[nodiscard]] StepChain drawn_steps(const std::vector<cairn::PathPose<cairn::SE2>>& path);
+
+/// The path given the loops, with a noise drawn for each of them. It begins from the steps as they were
+/// drawn, whatever has moved the path since: so no loop counts twice, and a path that is moved again is as
+/// likely to go there as to come back (the move keeps the posterior, in detailed balance).
+[[nodiscard]] std::vector<cairn::PathPose<cairn::SE2>> moved_by(std::vector<cairn::PathPose<cairn::SE2>> path,
+                                                                const std::vector<Loop>& loops,
+                                                                cairn::Random& random);
 
 }  // namespace grid_slam

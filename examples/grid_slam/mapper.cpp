@@ -35,17 +35,6 @@ std::vector<SE2> poses_on(const std::vector<cairn::PathPose<SE2>>& path) {
   return poses;
 }
 
-StepChain chain_of(const std::vector<cairn::PathPose<SE2>>& path) {
-  // A match that is surer than this is a match to what was seen a moment ago.
-  const Matrix<3> least = Vector<3>(9e-6, 9e-6, 1e-6).asDiagonal();
-  StepChain chain{path.front().pose, {}, {}};
-  for (std::size_t k = 1; k < path.size(); ++k) {
-    chain.steps.push_back(path[k].before.inverse() * path[k].drawn);
-    chain.covariances.push_back(path[k].drawn_from.covariance + least);
-  }
-  return chain;
-}
-
 /// Points of several scans, seen from the last pose.
 std::vector<ScanPoint> seen_together(const std::vector<SE2>& poses,
                                      const std::vector<std::vector<ScanPoint>>& points, std::size_t first,
@@ -277,7 +266,7 @@ void Mapper::look_for_loop() {
   looked_ = travelled_.back();
   const auto path = belief_->path(belief_->best());
   const std::vector<SE2> poses = poses_on(path);
-  const StepChain chain = chain_of(path);
+  const StepChain chain = drawn_steps(path);
   for (const std::size_t first : old_places(poses, chain)) {
     const Matrix<3> covariance = covariance_between(chain, first, poses.size() - 1);
     const std::optional<Loop> loop = measured_loop(poses, first, covariance);
@@ -380,7 +369,9 @@ void Mapper::move_paths() {
   std::vector<OccupancyMap> maps(distinct.size(), empty_map());
   cairn::parallel_for(distinct.size(), options_.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      paths[i] = moved_path(distinct[i]);
+      // Streams of the filter have the step in their upper half; these have all ones there.
+      cairn::Random own(options_.seed, ~(steps_.size() * belief.size() + distinct[i] + 1));
+      paths[i] = moved_by(belief.path(distinct[i]), loops_, own);
       for (std::size_t k = 0; k < points_.size(); ++k) maps[i].grid.insert(paths[i][k + 1].pose, points_[k]);
     }
   });
@@ -389,23 +380,6 @@ void Mapper::move_paths() {
   for (std::size_t i = 0; i < first.size(); ++i)
     if (first[i] != i) belief.copy_path(first[i], i);
   steps_.back().moved = true;
-}
-
-std::vector<cairn::PathPose<SE2>> Mapper::moved_path(std::size_t particle) const {
-  std::vector<cairn::PathPose<SE2>> path = belief_->path(particle);
-  // Streams of the filter have the step in their upper half; these have all ones there.
-  cairn::Random random(options_.seed, ~(steps_.size() * belief_->size() + particle + 1));
-  std::vector<Vector<3>> noise;
-  for (const Loop& loop : loops_) {
-    const Vector<3> v(random.normal(), random.normal(), random.normal());
-    noise.emplace_back(cairn::Cholesky<3>(loop.covariance).lower() * v);
-  }
-  const std::vector<SE2> moved = conditioned(chain_of(path), loops_, noise);
-  for (std::size_t k = 0; k < moved.size(); ++k) {
-    path[k].drawn_from.mean = moved[k] * (path[k].pose.inverse() * path[k].drawn_from.mean);
-    path[k].pose = moved[k];
-  }
-  return path;
 }
 
 std::vector<cairn::StampedPose2> Mapper::trajectory(bool means) const {

@@ -165,7 +165,6 @@ private:
   [[nodiscard]] std::optional<Loop> measured_loop(const std::vector<cairn::SE2>& poses, std::size_t first,
                                                   const cairn::Matrix<3>& covariance) const;
   void move_paths();
-  [[nodiscard]] std::vector<cairn::PathPose<cairn::SE2>> moved_path(std::size_t particle) const;
   [[nodiscard]] OccupancyMap empty_map() const;
 
   MapperOptions options_;

@@ -88,14 +88,14 @@ struct Canvas {
 };
 
 /// Of all these maps, and with no more pixels than a page shows.
-Canvas canvas_of(const std::vector<const MapImage*>& maps) {
+Canvas canvas_of(const std::vector<const PackedMap*>& maps) {
   double left = maps.front()->left, bottom = maps.front()->bottom, right = left, top = bottom;
   const double cell = maps.front()->cell_size;
-  for (const MapImage* m : maps) {
+  for (const PackedMap* m : maps) {
     left = std::min(left, m->left);
     bottom = std::min(bottom, m->bottom);
-    right = std::max(right, m->left + cell * m->image.width());
-    top = std::max(top, m->bottom + cell * m->image.height());
+    right = std::max(right, m->left + cell * m->width);
+    top = std::max(top, m->bottom + cell * m->height);
   }
   constexpr double most = 1400;  // pixels
   Canvas canvas{left, top,
@@ -135,7 +135,8 @@ constexpr const char* ancestors =
     " The particles' paths lie on each other where they have an ancestor in common.";
 
 void add_map(example::Report& page, const Results& r) {
-  const Canvas canvas = canvas_of({&r.map});
+  const PackedMap map(r.map);
+  const Canvas canvas = canvas_of({&map});
   example::Marks all = marked("all particles' paths", Ink::violet), path = marked("path", Ink::belief);
   for (const auto& each : r.paths)
     for (std::size_t k = 1; k < each.size(); ++k) add_step(all, canvas, each[k - 1], each[k]);
@@ -153,7 +154,7 @@ void add_map(example::Report& page, const Results& r) {
 
 /// The map as it grew.
 void add_film(example::Report& page, const Results& r) {
-  std::vector<const MapImage*> maps;
+  std::vector<const PackedMap*> maps;
   for (const Snapshot& s : r.snapshots) maps.push_back(&s.map);
   const Canvas canvas = canvas_of(maps);
   example::PictureFilm film{.title = "The map as it grew",
@@ -174,7 +175,7 @@ void add_film(example::Report& page, const Results& r) {
                                       std::to_string(s.loops) + (s.loops == 1 ? " loop" : " loops") +
                                       "; effective number of particles " + readable(s.effective_size) +
                                       "; maps " + readable(static_cast<double>(s.bytes) / 1048576.0) + " MB",
-                           .png = example::png_bytes(drawn_on(canvas, s.map)),
+                           .png = example::png_bytes(drawn_on(canvas, s.map.unpacked())),
                            .marks = {best, all}});
   }
   page.add(film);
@@ -273,7 +274,7 @@ Snapshot snapshot_of(const Mapper& mapper) {
              .processed = mapper.steps().size(),
              .loops = mapper.loops().size(),
              .effective_size = mapper.steps().empty() ? 0 : mapper.steps().back().effective_size,
-             .map = map_image(belief[best].map.grid),
+             .map = PackedMap(map_image(belief[best].map.grid)),
              .bytes = map_bytes(belief)};
   const auto record = belief.record();
   for (const auto& [pose, parent] : record.nodes)

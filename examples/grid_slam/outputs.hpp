@@ -35,7 +35,7 @@ namespace grid_slam {
 struct Snapshot {
   std::size_t scans = 0, processed = 0, loops = 0;  ///< so far
   double effective_size = 0;
-  MapImage map;                                    ///< of the best particle
+  PackedMap map;                                   ///< of the best particle
   std::vector<std::array<cairn::SE2, 2>> paths{};  ///< steps of all particles' paths, each once
   std::vector<cairn::SE2> best{};                  ///< the best particle's path
   std::size_t bytes = 0;                           ///< as map_bytes()

@@ -2,13 +2,17 @@
 // SPDX-License-Identifier: MIT
 #include "loop_closing.hpp"
 
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <vector>
 
 #include <Eigen/LU>
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
+#include <cairn/core/statistics.hpp>
+#include <cairn/filter/conditional.hpp>
 #include <cairn/filter/gaussian.hpp>
 
 #include "support/random.hpp"
@@ -43,6 +47,91 @@ double cost(const StepChain& chain, const std::vector<Loop>& loops, const std::v
   }
   return sum;
 }
+
+/// Three steps, each of a length that is uncertain and a turn that is not, and a loop from the first pose to
+/// the last: few enough paths for counting all.
+namespace toy {
+
+constexpr std::size_t steps = 3, parts = 3, classes = parts * parts * parts;
+constexpr std::array<double, steps> length{1.0, 0.8, 1.2}, turn{0.9, -1.7, 0.4}, sigma{0.2, 0.3, 0.25};
+constexpr double seen_x = 1.75, seen_y = 1.0, seen_sigma = 0.4;
+
+Loop loop() {
+  return {0, steps, SE2(seen_x, seen_y, turn[0] + turn[1] + turn[2]),
+          Matrix<3>(Vector<3>(seen_sigma * seen_sigma, seen_sigma * seen_sigma, 1).asDiagonal())};
+}
+
+/// Which of the thirds of its prior, about, each step's error is in: their ends lie between the lattice's
+/// points.
+std::size_t class_of(const std::array<double, steps>& errors) {
+  std::size_t number = 0;
+  for (std::size_t k = 0; k < steps; ++k) {
+    const double e = errors[k] / sigma[k];
+    number = parts * number + (e < -0.45 ? 0U : e < 0.45 ? 1U : 2U);
+  }
+  return number;
+}
+std::size_t class_of(const std::vector<PathPose<SE2>>& path) {
+  std::array<double, steps> errors{};
+  for (std::size_t k = 0; k < steps; ++k)
+    errors[k] = (path[k].pose.inverse() * path[k + 1].pose).x() - length[k];
+  return class_of(errors);
+}
+
+/// What is to come out, by summing prior times likelihood over a lattice of all paths.
+std::vector<double> enumerated() {
+  std::vector<double> probability(classes, 0);
+  constexpr int half = 50;
+  constexpr double spacing = 0.1;  // standard deviations
+  double total = 0;
+  for (int a = -half; a <= half; ++a)
+    for (int b = -half; b <= half; ++b)
+      for (int c = -half; c <= half; ++c) {
+        const std::array<double, steps> units{spacing * a, spacing * b, spacing * c};
+        std::array<double, steps> errors{};
+        double x = 0, y = 0, heading = 0, prior = 0;
+        for (std::size_t k = 0; k < steps; ++k) {
+          errors[k] = units[k] * sigma[k];
+          x += (length[k] + errors[k]) * std::cos(heading);
+          y += (length[k] + errors[k]) * std::sin(heading);
+          heading += turn[k];
+          prior += units[k] * units[k];
+        }
+        // The loop's error is on the right of the last pose: turned, which a circle does not mind.
+        const double dx = (x - seen_x) / seen_sigma, dy = (y - seen_y) / seen_sigma;
+        const double p = std::exp(-0.5 * (prior + dx * dx + dy * dy));
+        probability[class_of(errors)] += p;
+        total += p;
+      }
+  for (double& p : probability) p /= total;
+  return probability;
+}
+
+std::vector<PathPose<SE2>> drawn_path(Random& random) {
+  std::vector<PathPose<SE2>> path{{SE2(), {SE2(), Matrix<3>::Zero()}, SE2(), SE2(), 0}};
+  for (std::size_t k = 0; k < steps; ++k) {
+    const SE2 before = path.back().pose, mean = before * SE2(length[k], 0, turn[k]);
+    // On the right of the pose after the turn, so turned back.
+    const Vector<2> along(std::cos(turn[k]), -std::sin(turn[k]));
+    Matrix<3> covariance = Matrix<3>::Zero();
+    covariance.topLeftCorner<2, 2>() = sigma[k] * sigma[k] * along * along.transpose();
+    const SE2 drawn = before * SE2(length[k] + sigma[k] * random.normal(), 0, turn[k]);
+    path.push_back({drawn, {mean, covariance}, before, drawn, k + 1});
+  }
+  return path;
+}
+
+/// Pearson's sum over the classes.
+double distance_from(const std::vector<double>& expected, const std::vector<double>& counted, double count) {
+  double sum = 0;
+  for (std::size_t i = 0; i < classes; ++i) {
+    const double e = count * expected[i];
+    sum += (counted[i] - e) * (counted[i] - e) / e;
+  }
+  return sum;
+}
+
+}  // namespace toy
 
 }  // namespace
 
@@ -113,6 +202,49 @@ TEST_SUITE("grid_slam/loop_closing") {
       CHECK(std::abs(mean(i) - expected(i)) < 5 * std::sqrt(posterior(i, i) / count) + 2e-4);
       CHECK(covariance(i, i) == doctest::Approx(posterior(i, i)).epsilon(0.06));
     }
+  }
+
+  TEST_CASE(
+      "loop_closing: the move of a path keeps its distribution, in detailed balance: all paths enumerated") {
+    const std::uint64_t seed = cairn_test::seed(5);
+    CAPTURE(seed);
+    Random random(seed);
+    const std::vector<double> expected = toy::enumerated();
+    constexpr int count = 60000;
+    std::vector<double> once(toy::classes, 0), again(toy::classes, 0), twice_counted(toy::classes, 0);
+    std::vector<double> from_to(toy::classes * toy::classes, 0);
+    for (int i = 0; i < count; ++i) {
+      const auto moved = moved_by(toy::drawn_path(random), {toy::loop()}, random);
+      const auto moved_again = moved_by(moved, {toy::loop()}, random);
+      const std::size_t from = toy::class_of(moved), to = toy::class_of(moved_again);
+      ++once[from];
+      ++again[to];
+      ++from_to[from * toy::classes + to];
+      // What would be wrong: to take the moved path for one that was drawn.
+      auto taken_for_drawn = moved;
+      for (std::size_t k = 1; k < taken_for_drawn.size(); ++k) {
+        taken_for_drawn[k].before = taken_for_drawn[k - 1].pose;
+        taken_for_drawn[k].drawn = taken_for_drawn[k].pose;
+      }
+      ++twice_counted[toy::class_of(moved_by(taken_for_drawn, {toy::loop()}, random))];
+    }
+    const double enough = chi_square_quantile(1 - 1e-6, toy::classes - 1);
+    CHECK(toy::distance_from(expected, once, count) < enough);
+    CHECK(toy::distance_from(expected, again, count) < enough);
+    CHECK(toy::distance_from(expected, twice_counted, count) > 3 * enough);
+    // As many paths go from a to b as from b to a.
+    double sum = 0, pairs = 0, changed = 0;
+    for (std::size_t a = 0; a < toy::classes; ++a)
+      for (std::size_t b = 0; b < a; ++b) {
+        const double there = from_to[a * toy::classes + b], back = from_to[b * toy::classes + a];
+        changed += there + back;
+        if (there + back < 20) continue;
+        sum += (there - back) * (there - back) / (there + back);
+        ++pairs;
+      }
+    CHECK(pairs > 20);
+    CHECK(changed > 0.2 * count);
+    CHECK(sum < chi_square_quantile(1 - 1e-6, pairs));
   }
 
   TEST_CASE("loop_closing: no loops leave the chain, and steps outside of all loops their values") {
