@@ -35,9 +35,10 @@ struct FrameAhead {
   return std::clamp(threads, 1U, 4U);
 }
 
-/// So many are left to the work on one frame behind the cut.
+/// So many share the work on one frame behind the cut, where one at least is busy ahead of it. While the
+/// queue is full the others are free for it; until then some wait for each other.
 [[nodiscard]] constexpr unsigned threads_behind(unsigned threads) noexcept {
-  return std::max(threads, 1U) - threads_ahead(threads) + 1;
+  return std::max(threads, 2U) - 1;
 }
 
 /// One thread takes. The frames are the same for every number of `threads`, which are those of the whole run.

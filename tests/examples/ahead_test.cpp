@@ -134,6 +134,27 @@ TEST_CASE("ahead: an exception comes out where its item would, after all items b
   }
 }
 
+TEST_CASE("ahead: after an exception nothing is begun any more") {
+  std::atomic<std::size_t> begun = 0;
+  std::atomic<bool> failed = false;
+  {
+    Ahead<std::size_t> ahead(1000, 4, 1000, [&](std::size_t i, unsigned) {
+      ++begun;
+      if (i == 17) {
+        failed = true;
+        throw std::runtime_error("item 17 is torn");
+      }
+      if (i > 17) comes_true([&] { return failed.load(); });
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      return i;
+    });
+    for (std::size_t i = 0; i < 17; ++i) REQUIRE(ahead.take() == i);
+    CHECK_THROWS_AS(static_cast<void>(ahead.take()), std::runtime_error);
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+  CHECK(begun <= 17 + 1 + 4);  // what the others were about, one a thread
+}
+
 TEST_CASE("ahead: the first of several failures is the one that is heard of") {
   for (int trial = 0; trial < 20; ++trial) {
     Ahead<std::size_t> ahead(50, 4, 8, [&](std::size_t i, unsigned) -> std::size_t {

@@ -86,8 +86,8 @@ TEST_SUITE("program") {
   TEST_CASE("stereo_slam: --help names every option and ends well") {
     const Outcome help = run("--help");
     CHECK(help.code == 0);
-    for (const char* option :
-         {"--dataset", "--out", "--frames", "--seed", "--threads", "--store", "--points", "kitti_raw"}) {
+    for (const char* option : {"--dataset", "--out", "--frames", "--seed", "--threads", "--store", "--points",
+                               "--motion", "--budget", "kitti_raw"}) {
       CAPTURE(option);
       CHECK(help.says(option));
     }
