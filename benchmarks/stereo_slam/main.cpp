@@ -32,6 +32,7 @@
 #include "joint.hpp"
 #include "lasting.hpp"
 #include "pipeline.hpp"
+#include "receiver_heights.hpp"
 #include "reference_mounting.hpp"
 #include "saved_map.hpp"
 #include "starry_night.hpp"
@@ -203,12 +204,16 @@ void add_drift_row(Scoreboard& board) {
              .note = "--drift 0.05 --calibrate drifting"});
 }
 
+fs::path data_folder() {
+  const char* data = std::getenv("CAIRN_DATA");
+  return data != nullptr ? data : "../shared/data";
+}
+
 std::optional<Run> run_drive(const std::string& name, const std::string& kind,
                              stereo_slam::Calibration calibrate, bool and_back = false) {
-  const char* data = std::getenv("CAIRN_DATA");
   stereo_slam::DatasetOptions what;
   what.kind = kind;
-  what.folder = fs::path(data != nullptr ? data : "../shared/data") / name;
+  what.folder = data_folder() / name;
   if (!fs::exists(what.folder)) return std::nullopt;
   stereo_slam::PipelineOptions how;
   how.calibrate = calibrate;
@@ -258,14 +263,15 @@ void add_odometry_rows(Scoreboard& board, stereo_slam::Calibration calibrate) {
         drive ? std::optional(drive->cpu_milliseconds) : std::nullopt, drive.has_value());
 }
 
-/// In the ground plane, because the altitude of the satellite receiver is not that of the car: it climbs
-/// between the frames 25 and 45, so that from frame 50 on the reference is believed sideways, ahead and in
-/// heading.
+/// In the ground plane, because the altitude of the satellite receiver is not that of the car: it climbs by
+/// 0.7 m between the frames 25 and 45, where the same receiver's upward velocity says that it does not, so
+/// that from frame 50 on the reference is believed sideways, ahead and in heading. Besides, the reference
+/// with its heights by that velocity.
 void add_raw_rows(Scoreboard& board, stereo_slam::Calibration calibrate) {
   const auto drive = run_drive("kitti_raw_0926", "kitti_raw", calibrate);
   const std::string name =
       std::string("kitti_raw_0926") + (calibrate == stereo_slam::Calibration::off ? ", --calibrate off" : "");
-  std::optional<double> ate, over25, over50, level25, level50, lost, nees, level_nees;
+  std::optional<double> ate, over25, over50, by_velocity50, level25, level50, lost, nees, level_nees;
   if (drive) {
     std::vector<cairn::PosePair> pairs = stereo_slam::truth_pairs(drive->record);
     lost = static_cast<double>(drive->summary.frames_lost);
@@ -277,6 +283,20 @@ void add_raw_rows(Scoreboard& board, stereo_slam::Calibration calibrate) {
     };
     mean_over(25, over25);
     mean_over(50, over50);
+    const stereo_slam_bench::ReceiverHeights heights(data_folder() / "kitti_raw_0926");
+    if (!heights.empty()) {
+      // The reference of a frame is what the receiver said 0.1 s earlier, as its file says.
+      constexpr double behind = 0.1;
+      const double start = drive->record.frames.front().time;
+      const std::vector<cairn::PosePair> as_given = pairs;
+      for (cairn::PosePair& pair : pairs) {
+        cairn::Vector<3> place = pair.truth.translation();
+        place(1) += heights.slip(pair.time - start - behind);  // y points down
+        pair.truth = cairn::SE3(pair.truth.rotation(), place);
+      }
+      mean_over(50, by_velocity50);
+      pairs = as_given;
+    }
     for (cairn::PosePair& pair : pairs)
       for (cairn::SE3* pose : {&pair.truth, &pair.estimate}) {
         cairn::Vector<3> flat = pose->translation();
@@ -292,6 +312,9 @@ void add_raw_rows(Scoreboard& board, stereo_slam::Calibration calibrate) {
   add(board, {.name = name + ": mean error over 25 m", .unit = "%"}, over25, drive.has_value());
   add(board, {.name = name + ": mean error over 50 m", .unit = "%", .must = 1.2, .aim = 1.0}, over50,
       drive.has_value());
+  add(board,
+      {.name = name + ": mean error over 50 m, heights by the receiver's upward velocity", .unit = "%"},
+      by_velocity50, drive.has_value());
   add(board, {.name = name + ": mean error over 25 m in the ground plane", .unit = "%"}, level25,
       drive.has_value());
   add(board, {.name = name + ": mean error over 50 m in the ground plane", .unit = "%"}, level50,
