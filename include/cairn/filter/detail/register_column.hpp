@@ -110,6 +110,14 @@ struct Column {
         store_lanes<S, width, N - k * width>(to + k * width, lanes[k]);
     });
   }
+  /// Number I, 0 past the last.
+  template <int I>
+  [[gnu::always_inline]] static S number_or_zero(const S (&from)[N]) {
+    if constexpr (I < N)
+      return from[I];
+    else
+      return S(0);
+  }
   /// From single numbers: not loaded as a whole, which would have to wait for all of them to be stored.
   [[gnu::always_inline]] void gather(const S (&from)[N]) {
     unrolled<static_cast<std::size_t>(count)>([&](auto index) __attribute__((always_inline)) {
@@ -118,10 +126,7 @@ struct Column {
         lanes[k] = from[k];
       else
         [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
-          lanes[k] =
-              Lane{(k * width + static_cast<int>(I) < N
-                        ? from[k * width + static_cast<int>(I) < N ? k * width + static_cast<int>(I) : 0]
-                        : S(0))...};
+          lanes[k] = Lane{number_or_zero<k * width + static_cast<int>(I)>(from)...};
         }(std::make_index_sequence<static_cast<std::size_t>(width)>{});
     });
   }
