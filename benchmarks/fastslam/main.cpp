@@ -25,6 +25,7 @@
 
 #include "batch.hpp"
 #include "ekf_slam.hpp"
+#include "joint_rival.hpp"
 #include "lines.hpp"
 #include "shared_buckets.hpp"
 #include "slam.hpp"
@@ -349,6 +350,7 @@ int main(int argc, char** argv) {
   add_robots(board);
   add_park(board);
   add_nees(board);
+  add_joint_rival(board);
   add_index(board);
   add_index_rivals(board);
   add_lines(board);

@@ -133,6 +133,7 @@ void add_stop_rows(Scoreboard& board) {
   if (const auto folder = cairn_test::real_data("dp_slam")) {
     const cairn::CarmenLog log = cairn::read_carmen(*folder / "loop5.log");
     const auto by = [&](grid_slam::StopStorage storage) {
+      std::cerr << "DP-SLAM's log, " << (storage == grid_slam::StopStorage::tiles ? "tiles" : "tree") << "\n";
       return grid_slam::run_stop_mapper(log, {.storage = storage}, {});
     };
     const Results tree = by(grid_slam::StopStorage::ancestry), tiles = by(grid_slam::StopStorage::tiles);
@@ -165,6 +166,7 @@ void add_stop_rows(Scoreboard& board) {
       options.seed = seed;
       options.threads = std::max(1U, std::thread::hardware_concurrency());
       means.push_back(grid_slam::run_stop_mapper(*log, options, relations).of_means->mean);
+      std::cerr << "DP-SLAM's map, seed " << seed << ": " << means.back() << " m\n";
     }
     aces.measured = median(means);
     aces.note = "worst " + std::to_string(worst(means)) + " m";

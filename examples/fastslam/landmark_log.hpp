@@ -37,6 +37,12 @@ struct Between {
   cairn::SE2 moved{};     ///< since then
 };
 
+/// A place by satellites, in a frame of its own: east and north [m].
+struct GpsFix {
+  double time = 0;  ///< of the log: of the frame or pose at which the robot was there
+  cairn::Vector<2> place{};
+};
+
 struct LandmarkLog {
   std::string name{};
   PointSensor sensor{};
@@ -46,6 +52,7 @@ struct LandmarkLog {
   std::map<std::uint32_t, cairn::Vector<2>> landmarks{};  ///< true ones by identity
   std::optional<cairn::SE2> start{};  ///< true pose before the first frame, where it is known
   std::vector<std::string> notes{};   ///< what was left out
+  std::vector<GpsFix> gps{};          ///< for a picture: nothing is estimated from it
 
   /// Forgets which landmarks were seen.
   void withhold_identities() {
@@ -61,6 +68,11 @@ struct LandmarkLog {
 /// A graph of ODOMETRY and LANDMARK lines, as Victoria Park's is published (J. Guivant, E. Nebot, T-RA 17,
 /// 2001; the graph by M. Kaess, F. Dellaert, T-RO 24, 2008). Throws cairn::Error naming the line.
 [[nodiscard]] LandmarkLog read_graph(const std::filesystem::path& path);
+
+/// Adds Victoria Park's GPS to its graph, which has no times: a fix belongs to the pose at the same share of
+/// the way that the wheels have turned. Files of MATLAB 5: `fixes` with timeGps, Lo_m, La_m, `wheels` with
+/// time, speed. Throws cairn::Error naming the file.
+void read_gps(LandmarkLog& log, const std::filesystem::path& fixes, const std::filesystem::path& wheels);
 
 /// Landmarks and way points.
 struct PointMap {

@@ -47,8 +47,13 @@ std::filesystem::path data_folder(const Options& options, const char* name) {
 
 LandmarkLog log_of(const Options& options) {
   if (options.data == "mrclam") return read_mrclam(data_folder(options, "mrclam_7"), options.robot);
-  if (options.data == "victoria_park")
-    return read_graph(data_folder(options, "victoria_park") / "victoria_park_graph.txt");
+  if (options.data == "victoria_park") {
+    const std::filesystem::path folder = data_folder(options, "victoria_park");
+    LandmarkLog log = read_graph(folder / "victoria_park_graph.txt");
+    const std::filesystem::path fixes = folder / "aa3_gpsx.mat", wheels = folder / "aa3_dr.mat";
+    if (std::filesystem::exists(fixes) && std::filesystem::exists(wheels)) read_gps(log, fixes, wheels);
+    return log;
+  }
   if (options.data == "map") {
     if (options.name.empty())
       cairn::raise("--data map: expected the name of a map as --name: example_webmap, say");
@@ -75,6 +80,7 @@ void print(const Results& r, const std::filesystem::path& out) {
     std::cout << "path " << *r.path_error << " m, odometry " << *r.odometry_error
               << " m (rms after a rigid fit)\n";
   if (r.landmark_error) std::cout << "landmarks " << *r.landmark_error << " m\n";
+  if (r.gps_median) std::cout << "GPS " << *r.gps_median << " m from the path (median after a rigid fit)\n";
   for (const std::string& note : r.notes) std::cout << note << "\n";
   std::cout << "results in " << std::filesystem::absolute(out).lexically_normal().string() << "\n";
 }
@@ -98,8 +104,7 @@ void add_options(CLI::App& app, Options& o) {
   app.add_option("--out", o.out, "folder for the trajectory, the landmarks, the summary and the report");
   app.add_option("--particles", o.slam.particles, "number of particles")
       ->check(example::whole_number(1, 100000));
-  app.add_option("--redraw", o.slam.redraw_every,
-                 "where all sightings have names, draw all paths again every so many frames; 0: never")
+  app.add_option("--redraw", o.slam.redraw_every, "draw all paths again every so many frames; 0: never")
       ->check(example::whole_number(0, 1000000));
   app.add_option("--seed", o.slam.seed, "the same seed gives the same results for any number of threads")
       ->check(example::whole_number(0));

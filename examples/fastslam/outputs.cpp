@@ -130,6 +130,12 @@ void add_map(example::Report& page, const Results& r) {
     plot.curves.push_back(curve_of("odometry", Ink::grey, odometry, fit));
   }
   if (!r.truth.empty()) plot.curves.push_back(curve_of("truth", Ink::truth, places_of(r.truth), {}));
+  if (!r.gps.empty()) {
+    plot.curves.push_back(curve_of("GPS", Ink::measurement, r.gps, T, true));
+    plot.caption +=
+        " GPS, which was not used, is moved rigidly onto the path: half of its fixes are within " +
+        readable(*r.gps_median) + " m of it. The receiver jumps, and was out for a part of the way.";
+  }
   plot.curves.push_back(curve_of("path", Ink::belief, places_of(r.mean), T));
   if (!r.true_landmarks.empty())
     plot.curves.push_back(curve_of("true landmarks", Ink::truth, r.true_landmarks, {}, true));
@@ -138,20 +144,24 @@ void add_map(example::Report& page, const Results& r) {
 }
 
 void add_steps(example::Report& page, const Results& r) {
-  std::vector<double> time, size, landmarks, seen, sigma;
+  std::vector<double> time, size, landmarks, seen, sigma, redrawn;
   for (const StepRecord& s : r.steps) {
+    redrawn.push_back(s.redrawn.value_or(std::nan("")));
     time.push_back(s.time - r.steps.front().time);
     size.push_back(s.effective_size);
     landmarks.push_back(static_cast<double>(s.landmarks));
     seen.push_back(static_cast<double>(s.sightings));
     sigma.push_back(std::sqrt(s.pose.covariance(0, 0) + s.pose.covariance(1, 1)));
   }
-  page.add(example::LinePlot{.title = "Effective number of particles",
-                             .caption = "1 / sum of the squared weights, before resampling.",
-                             .x = {"time", "s"},
-                             .y = {"N_eff", ""},
-                             .x_values = time,
-                             .curves = {{"N_eff", Ink::belief, size}}});
+  page.add(example::LinePlot{
+      .title = "Effective number of particles",
+      .caption = "1 / sum of the squared weights, before resampling; and of the paths "
+                 "where all were drawn again.",
+      .x = {"time", "s"},
+      .y = {"N_eff", ""},
+      .x_values = time,
+      .curves = {{"N_eff", Ink::belief, size},
+                 {.name = "drawn again", .ink = Ink::violet, .values = redrawn, .dots = true}}});
   page.add(example::LinePlot{
       .title = "Landmarks",
       .caption = "In the map of one particle, and how many were seen at once.",
@@ -224,6 +234,7 @@ std::string summary(const Results& r) {
   json["path_rms_m"] = json_of(r.path_error);
   json["odometry_rms_m"] = json_of(r.odometry_error);
   json["landmarks_rms_m"] = json_of(r.landmark_error);
+  json["gps_median_m"] = json_of(r.gps_median);
   json["notes"] = r.notes;
   json["ended_early"] = r.ended_early ? Json(*r.ended_early) : Json(nullptr);
   return json.dump(2) + "\n";

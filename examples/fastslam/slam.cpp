@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <numeric>
 #include <utility>
 
 #include <cairn/core/check.hpp>
@@ -41,24 +42,52 @@ std::vector<SE2> means_of(const Belief& belief, std::size_t particle) {
   return poses;
 }
 
-/// What the particles' own model says of a path: its map, and log p(x_1:t, z_1:t).
+/// Which landmarks the sightings along a path are of: by their names, or the likeliest at each pose in turn.
+std::vector<cairn::Association> associations_along(const LandmarkLog& log, const std::vector<SE2>& poses,
+                                                   Map map) {
+  std::vector<cairn::Association> all;
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    const auto& seen = log.frames[k].seen;
+    all.push_back(map.likeliest(map.candidates({poses[k], cairn::Matrix<3>::Zero()}, seen)).choice);
+    map.insert(poses[k], seen, all.back());
+  }
+  return all;
+}
+
+/// Names the sightings of the log's first frames by these associations, as a map numbers its landmarks.
+LandmarkLog named(const LandmarkLog& log, const std::vector<cairn::Association>& associations) {
+  LandmarkLog part{.name = log.name, .sensor = log.sensor};
+  std::uint32_t numbers = 0;
+  for (std::size_t k = 0; k < associations.size(); ++k) {
+    Frame& frame = part.frames.emplace_back(log.frames[k]);
+    for (std::size_t i = 0; i < frame.seen.size(); ++i) {
+      auto& identity = frame.seen[i].identity;
+      const std::uint32_t n = associations[k][i];
+      if (identity || n == cairn::no_landmark) continue;
+      identity = n == cairn::new_landmark ? numbers++ : n;
+    }
+  }
+  return part;
+}
+
+/// What the particles' own model says of a path: its map, and log p(x_1:t, n_1:t, z_1:t).
 struct Replayed {
   std::vector<cairn::PathPose<SE2>> path;
   Map map;
   double log_density = 0;
 };
-Replayed replayed(const LandmarkLog& log, const std::vector<SE2>& poses, Map map) {
+Replayed replayed(const LandmarkLog& log, const std::vector<cairn::Association>& associations,
+                  const std::vector<SE2>& poses, Map map) {
   Replayed r{{}, std::move(map)};
   const cairn::Gaussian<SE2> start{SE2(), cairn::Matrix<3>::Zero()};
   r.path.push_back({start.mean, start, start.mean, start.mean, 0});
-  cairn::Random none(1);  // names leave nothing to draw
   for (std::size_t k = 0; k < poses.size(); ++k) {
     const Frame& frame = log.frames[k];
     const SE2 before = r.path.back().pose;
     const cairn::Gaussian<SE2> motion{before * frame.moved.mean, frame.moved.covariance};
-    const auto chosen = r.map.choose(poses[k], frame.seen, none);
-    r.log_density += cairn::log_density(motion, poses[k]) + chosen.log_likelihood;
-    r.map.insert(poses[k], frame.seen, chosen.choice);
+    r.log_density +=
+        cairn::log_density(motion, poses[k]) + r.map.log_likelihood(poses[k], frame.seen, associations[k]);
+    r.map.insert(poses[k], frame.seen, associations[k]);
     r.path.push_back({poses[k], {poses[k], cairn::Matrix<3>::Zero()}, before, poses[k], k + 1});
   }
   return r;
@@ -68,25 +97,34 @@ Replayed replayed(const LandmarkLog& log, const std::vector<SE2>& poses, Map map
 /// particles' own model says of them over that density. Importance sampling of the same distribution as the
 /// filter's, which never goes back: with that alone a bend between two visits stays, and where no particle
 /// came back right, none ever will. O(M frames log landmarks), and a sparse least squares.
-/// `optimum` is where the last one was, and then where this one is.
+/// Where sightings have no names, those of one particle stand for all, which is drawn by its weight: all but
+/// the newest have the particles in common anyway, for they have the same ancestors. `optimum` is where the
+/// last one was, and then where this one is.
 Belief redrawn(const Belief& belief, const LandmarkLog& log, const SlamOptions& options,
                std::vector<SE2>& optimum) {
-  LandmarkLog part{.name = log.name, .sensor = log.sensor};
   const std::size_t frames = belief.steps();
-  part.frames.assign(log.frames.begin(), log.frames.begin() + static_cast<std::ptrdiff_t>(frames));
+  const Map empty(log.sensor, options.landmarks);
+  cairn::Random choice(~options.seed, (frames << 32U) + belief.size());
+  const std::size_t one =
+      cairn::resampled_indices(belief.particles().weights(), 1, cairn::Resampling::systematic, choice)
+          .front();
+  std::vector<SE2> poses_of_one;
+  for (const auto& each : belief.path(one)) poses_of_one.push_back(each.pose);
+  poses_of_one.erase(poses_of_one.begin());  // the start
+  const auto associations = associations_along(log, poses_of_one, empty);
+  const LandmarkLog part = named(log, associations);
   const std::vector<SE2> best = means_of(belief, belief.best());
   for (std::size_t k = optimum.size(); k < frames; ++k)
     optimum.push_back(k == 0 ? best[0] : optimum[k - 1] * best[k - 1].inverse() * best[k]);
   const PathDensity density(part, batch_optimum(part, optimum));
   optimum = density.optimum().poses;
-  const Map empty(part.sensor, options.landmarks);
   std::vector<std::optional<Replayed>> drawn(belief.size());
   std::vector<double> log_weights(belief.size());
   cairn::parallel_for(belief.size(), options.threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       cairn::Random random(~options.seed, (frames << 32U) + i);  // not the filter's
       const std::vector<SE2> poses = density.draw(random);
-      drawn[i] = replayed(log, poses, empty);
+      drawn[i] = replayed(log, associations, poses, empty);
       log_weights[i] = drawn[i]->log_density - density.log_density(poses);
     }
   });
@@ -177,11 +215,33 @@ void measure_landmarks(Results& r, const LandmarkLog& log) {
   if (found.size() >= 2) r.landmark_error = rms(found, is, rigid_fit(found, is));
 }
 
-bool all_named(const LandmarkLog& log) {
-  return std::ranges::all_of(log.frames, [](const Frame& frame) {
-    return std::ranges::all_of(frame.seen,
-                               [](const auto& sighting) { return sighting.identity.has_value(); });
-  });
+/// GPS beside the path. The receiver of such a car jumps by tens of metres: the motion is fitted to the fixes
+/// that are nearest to the path, four fifths of them, ten times over.
+void measure_gps(Results& r, const LandmarkLog& log) {
+  std::vector<Vector<2>> fixes, path;
+  for (const GpsFix& fix : log.gps)
+    if (const StampedPose2* pose = last_until(r.mean, fix.time)) {
+      fixes.push_back(fix.place);
+      path.push_back(pose->pose.translation());
+    }
+  if (fixes.size() < 4) return;
+  std::vector<std::size_t> order(fixes.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  SE2 fit = rigid_fit(fixes, path);
+  std::vector<double> distance(fixes.size());
+  for (int round = 0; round <= 10; ++round) {
+    for (std::size_t i = 0; i < fixes.size(); ++i) distance[i] = (fit * fixes[i] - path[i]).norm();
+    std::ranges::sort(order, {}, [&](std::size_t i) { return std::pair(distance[i], i); });
+    if (round == 10) break;
+    std::vector<Vector<2>> from, to;
+    for (std::size_t k = 0; k < order.size() * 4 / 5; ++k) {
+      from.push_back(fixes[order[k]]);
+      to.push_back(path[order[k]]);
+    }
+    fit = rigid_fit(from, to);
+  }
+  r.gps_median = distance[order[order.size() / 2]];
+  for (const Vector<2>& fix : fixes) r.gps.emplace_back(fit * fix);
 }
 
 bool has_identities(const LandmarkLog& log) {
@@ -256,8 +316,7 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
   Belief belief(SE2(), Map(log.sensor, options.landmarks), options.particles);
   const cairn::ConditionalFilter filter{
       .resample_below = options.resample_below, .seed = options.seed, .threads = options.threads};
-  const bool redraws =
-      options.redraw_every > 0 && options.proposal == ProposalKind::landmarks && all_named(log);
+  const bool redraws = options.redraw_every > 0 && options.proposal == ProposalKind::landmarks;
   std::size_t next_redraw = options.redraw_every;
   std::vector<SE2> odometry, optimum;
   const std::size_t every = std::max<std::size_t>(1, log.frames.size() / 40);
@@ -265,14 +324,17 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
     const cairn::MappingStep did = step(filter, belief, frame, options.proposal);
     if (!did.accepted())
       cairn::raise("frame " + std::to_string(odometry.size()) + ": " + explain(did.status));
+    std::optional<double> redrawn_size;
     if (redraws && belief.steps() == next_redraw) {
       belief = redrawn(belief, log, options, optimum);
+      redrawn_size = belief.particles().effective_size();
       next_redraw += std::max<std::size_t>(options.redraw_every, next_redraw / 8);
     }
     odometry.push_back(odometry.empty() ? frame.moved.mean : odometry.back() * frame.moved.mean);
     r.steps.push_back({frame.time,
                        did.effective_size,
                        did.resampled,
+                       redrawn_size,
                        frame.seen.size(),
                        belief[0].map.size(),
                        belief.pose(),
@@ -293,6 +355,7 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
   r.node_copies = belief[belief.best()].map.node_copies();
   measure_path(r, log);
   measure_landmarks(r, log);
+  measure_gps(r, log);
   return r;
 }
 

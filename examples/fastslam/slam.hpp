@@ -33,9 +33,10 @@ struct SlamOptions {
   unsigned threads = 1;
   ProposalKind proposal = ProposalKind::landmarks;
   double resample_below = 0.5;
-  /// Where every sighting has a name, with FastSLAM 2.0: all paths are drawn again from the Gaussian about
-  /// the least squares of the log so far, and weighed. Every so many frames and an eighth of those before,
-  /// whichever is more, so that a log costs O(its length). 0: never, which is FastSLAM as published.
+  /// With FastSLAM 2.0: all paths are drawn again from the Gaussian about the least squares of the log so
+  /// far, and weighed; without names, under the associations of one particle. Every so many frames and an
+  /// eighth of those before, whichever is more, so that a log costs O(its length). 0: never, which is
+  /// FastSLAM as published.
   std::size_t redraw_every = 250;
   cairn::LandmarkOptions landmarks{.pick = cairn::Pick::drawn, .gate = 0.999};
 };
@@ -44,6 +45,8 @@ struct StepRecord {
   double time = 0;
   double effective_size = 0;
   bool resampled = false;
+  std::optional<double>
+      redrawn{};  ///< effective number of the paths that were drawn again here, if they were
   std::size_t sightings = 0, landmarks = 0;  ///< of the frame; of the first particle
   cairn::Gaussian<cairn::SE2> pose{};
   std::optional<double> nees{};  ///< of the pose, where the truth is known: of a start that is exact
@@ -78,6 +81,9 @@ struct Results {
       truth{};  ///< at frames and between, times of the log
   std::vector<FoundLandmark> landmarks{};
   std::vector<cairn::Vector<2>> true_landmarks{};  ///< all
+  /// Fixes moved rigidly onto the mean path, whose jumps pull at nothing; and how far from the path they are.
+  std::vector<cairn::Vector<2>> gps{};
+  std::optional<double> gps_median{};  ///< [m]
   std::vector<Snapshot> snapshots{};
   std::size_t node_copies = 0;  ///< of the best particle's map; with several threads not always the same
   /// Root mean square after the rigid motion that fits the path best to the truth [m]; of the landmarks, by

@@ -89,7 +89,8 @@ void add_map(example::Report& page, const std::string& title, const std::string&
                                      readable(map.path_rms) + " m from the true one.",
                           .x = {"x", "m"},
                           .y = {"y", "m"},
-                          .curves = {edges_from_above(drive)}};
+                          .curves = {edges_from_above(drive)},
+                          .third = true};
   example::PlaneCurve lines{.name = "lines of the map", .ink = Ink::belief};
   for (const FoundLine& l : map.lines) append(lines, l.belief.mean.from, l.belief.mean.to);
   plot.curves.push_back(std::move(lines));

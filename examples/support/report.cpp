@@ -143,6 +143,7 @@ Json plane_head(const char* kind, const Panel& panel) {
   Json json = head(kind, panel);
   json["x"] = axis(panel.x);
   json["y"] = axis(panel.y);
+  if constexpr (requires { panel.third; }) json["third"] = panel.third;
   json["equal_scale"] = panel.equal_scale;
   return json;
 }

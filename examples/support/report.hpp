@@ -105,6 +105,7 @@ struct PlanePlot {
   Axis y = {};
   std::vector<PlaneCurve> curves = {};
   bool wide = false;
+  bool third = false;  ///< three side by side, where the page has room
   bool equal_scale = true;
 };
 

@@ -18,6 +18,7 @@
 #include "ekf_slam.hpp"
 #include "support/data.hpp"
 #include "support/folder.hpp"
+#include "support/matlab_file.hpp"
 #include "support/random.hpp"
 
 namespace fastslam_test {
@@ -224,6 +225,73 @@ TEST_SUITE("fastslam/slam") {
     CHECK(map("lm 2 0\nwp 2 1\n0 0\n") != "");
     CHECK(map("lm 2 3\n1 2\n") != "");
     CHECK(map("lm 2 1\n1 inf\nwp 2 1\n0 0\n").find(":2") != std::string::npos);
+  }
+
+  TEST_CASE(
+      "fastslam: fixes by satellites find their place on the path, and their jumps are left out of the fit") {
+    const cairn_test::Folder folder;
+    // A way of 12 m around a corner, a pose a metre; the wheels take 2 s for each, and stand for 10 s on the
+    // way.
+    LandmarkLog log;
+    std::vector<double> time{0}, speed;
+    for (int k = 1; k <= 12; ++k) {
+      log.frames.push_back(
+          {1.0 * k,
+           {SE2(1, 0, k == 6 ? 1.5 : 0.0), cairn::Matrix<3>(1e-12 * cairn::Matrix<3>::Identity())},
+           {}});
+      speed.push_back(0.5);
+      time.push_back(time.back() + 2);
+      if (k != 4) continue;
+      speed.push_back(0);
+      time.push_back(time.back() + 10);
+    }
+    speed.push_back(0.5);
+    const SE2 T_gps_world(300, -40, 2.2);
+    std::vector<double> fix_time, east, north;
+    SE2 pose;
+    for (std::size_t k = 0; k < log.frames.size(); ++k) {
+      pose = pose * log.frames[k].moved.mean;
+      const Vector<2> at = T_gps_world * pose.translation();
+      const bool jumps = k == 2 || k == 9;
+      fix_time.push_back(k < 4 ? 2.0 * static_cast<double>(k + 1) : 10 + 2.0 * static_cast<double>(k + 1));
+      east.push_back(at(0) + (jumps ? 25 : 0));
+      north.push_back(at(1));
+    }
+    const auto fixes = [&] {
+      return cairn_test::matlab_file({{"timeGps", fix_time}, {"Lo_m", east}, {"La_m", north}});
+    };
+    folder.put("gps.mat", fixes());
+    folder.put("wheels.mat", cairn_test::matlab_file({{"time", time}, {"speed", speed}}));
+    read_gps(log, folder / "gps.mat", folder / "wheels.mat");
+    REQUIRE(log.gps.size() == 12);
+    for (std::size_t k = 0; k < 12; ++k) CHECK(log.gps[k].time == static_cast<double>(k + 1));
+
+    const Results mapped = run(log, {.particles = 2});
+    REQUIRE(mapped.gps.size() == 12);
+    CHECK(*mapped.gps_median < 1e-3);
+    for (std::size_t k = 0; k < 12; ++k) {
+      const double off = (mapped.gps[k] - mapped.mean[k].pose.translation()).norm();
+      CHECK((k == 2 || k == 9 ? off > 20 : off < 0.05));
+    }
+
+    const auto refused = [&](const std::string& gps, const std::string& wheels) {
+      folder.put("gps.mat", gps);
+      folder.put("wheels.mat", wheels);
+      return complaint([&] { read_gps(log, folder / "gps.mat", folder / "wheels.mat"); });
+    };
+    const std::string wheels = cairn_test::matlab_file({{"time", time}, {"speed", speed}});
+    CHECK(refused("", wheels).find("gps.mat: expected a MATLAB file of level 5") != std::string::npos);
+    CHECK(refused(fixes().substr(0, fixes().size() - 8), wheels).find("elements that end") !=
+          std::string::npos);
+    CHECK(refused(cairn_test::matlab_file({{"timeGps", {1}}, {"Lo_m", {1}}}), wheels).find("an array La_m") !=
+          std::string::npos);
+    CHECK(refused(fixes(), cairn_test::matlab_file({{"time", {2, 1}}, {"speed", {1, 1}}}))
+              .find("do not fall") != std::string::npos);
+    CHECK(
+        refused(fixes(), cairn_test::matlab_file({{"time", {1, 2}}, {"speed", {0, 0}}})).find("that turn") !=
+        std::string::npos);
+    CHECK(refused(fixes(), cairn_test::matlab_file({{"time", {1, 2}}, {"speed", {NAN, 0}}})).find("finite") !=
+          std::string::npos);
   }
 
   TEST_CASE("fastslam: robots in a hall, their landmarks unknown but for who they are") {

@@ -404,31 +404,44 @@ struct FromLandmarks {
       raise(
           "FromLandmarks: expected a motion that is uncertain in every direction, found a singular "
           "covariance");
-    Chosen<Association> chosen =
-        hypotheses > 0 ? best_explained(motion, map, z) : map.associate(motion, z, random);
-    Gaussian<typename L::State> q = motion;
-    double log_evidence = take_in(q, map, z, chosen.choice);
+    auto best = hypotheses > 0 ? best_explained(motion, map, z)
+                               : explained(motion, map, z, map.associate(motion, z, random));
     for (int again = 1; again < associations; ++again) {
-      Chosen<Association> next = map.associate(q, z, random);
-      if (next.choice == chosen.choice && map.options().pick == Pick::likeliest) break;
-      chosen = std::move(next);
-      q = motion;
-      log_evidence = take_in(q, map, z, chosen.choice);
+      Chosen<Association> next = map.associate(best.q, z, random);
+      if (next.choice == best.chosen.choice && map.options().pick == Pick::likeliest) break;
+      best = explained(motion, map, z, std::move(next));
     }
-    typename L::State x = sample(q, random);
-    const double log_likelihood = map.log_likelihood(x, z, chosen.choice);
+    typename L::State x = sample(best.q, random);
+    const double log_likelihood = map.log_likelihood(x, z, best.chosen.choice);
     const double log_weight = weight == Weight::evidence
-                                  ? log_evidence
-                                  : log_likelihood + log_density(motion, x) - log_density(q, x);
+                                  ? best.log_evidence
+                                  : log_likelihood + log_density(motion, x) - log_density(best.q, x);
     return {std::move(x),
-            std::move(q),
-            log_weight - chosen.log_probability,
+            std::move(best.q),
+            log_weight - best.chosen.log_probability,
             log_likelihood,
             0,
-            std::move(chosen.choice)};
+            std::move(best.chosen.choice)};
   }
 
 private:
+  /// What the sightings are of, the pose after they are taken in, and how likely they are together.
+  template <Manifold X>
+  struct Explanation {
+    Chosen<Association> chosen;
+    Gaussian<X> q;
+    double log_evidence = 0;
+  };
+  template <LandmarkSensor L, class F>
+  [[nodiscard]] Explanation<typename L::State> explained(const Gaussian<typename L::State>& motion,
+                                                         const LandmarkMap<L, F>& map,
+                                                         const typename LandmarkMap<L, F>::Observation& z,
+                                                         Chosen<Association> chosen) const {
+    Explanation<typename L::State> result{std::move(chosen), motion};
+    result.log_evidence = take_in(result.q, map, z, result.chosen.choice);
+    return result;
+  }
+
   /// A sighting as one of a landmark.
   struct Known {
     std::size_t sighting;
@@ -467,19 +480,17 @@ private:
   }
 
   template <LandmarkSensor L, class F>
-  [[nodiscard]] Chosen<Association> best_explained(const Gaussian<typename L::State>& motion,
-                                                   const LandmarkMap<L, F>& map,
-                                                   const typename LandmarkMap<L, F>::Observation& z) const {
+  [[nodiscard]] Explanation<typename L::State> best_explained(
+      const Gaussian<typename L::State>& motion, const LandmarkMap<L, F>& map,
+      const typename LandmarkMap<L, F>::Observation& z) const {
     using Model = detail::ModelOf<L>;
     const auto candidates = map.candidates(motion, z);
-    Chosen<Association> best = map.likeliest(candidates);
-    Gaussian<typename L::State> q = motion;
-    double most = take_in(q, map, z, best.choice);
-    std::vector<Association> tried{best.choice};
+    auto best = explained(motion, map, z, map.likeliest(candidates));
+    std::vector<Association> tried{best.chosen.choice};
     int in_vain = 0;
     for (const Known& each : beginnings(map, candidates, motion.mean, z)) {
       if (++in_vain > hypotheses) break;
-      q = motion;
+      Gaussian<typename L::State> q = motion;
       const auto& model = detail::model_of(map.sensor(), z[each.sighting].z);
       const auto in = Extended{.iterations = iterations}.update(
           q, detail::SensorOfPose<Model>{model, map.find(each.landmark)->belief},
@@ -488,11 +499,9 @@ private:
       Chosen<Association> chosen = map.likeliest(map.narrowed(candidates, q, z));
       if (std::find(tried.begin(), tried.end(), chosen.choice) != tried.end()) continue;
       tried.push_back(chosen.choice);
-      q = motion;
-      const double log_evidence = take_in(q, map, z, chosen.choice);
-      if (!(log_evidence > most)) continue;
-      most = log_evidence;
-      best = std::move(chosen);
+      auto next = explained(motion, map, z, std::move(chosen));
+      if (!(next.log_evidence > best.log_evidence)) continue;
+      best = std::move(next);
       in_vain = 0;
     }
     return best;

@@ -54,7 +54,7 @@ function contents(data) {
 
 function show(panel, number, grid) {
   const body = element('div', { className: 'body' });
-  const card = element('section', { className: panel.wide ? 'panel wide' : 'panel', id: `figure-${number}` },
+  const card = element('section', { className: panel.wide ? 'panel wide' : panel.third ? 'panel third' : 'panel', id: `figure-${number}` },
     element('h2', { id: `title-${number}` }, panel.title), panel.caption ? element('p', {}, panel.caption) : null, body);
   card.setAttribute('aria-labelledby', `title-${number}`);
   grid.append(card);

@@ -94,7 +94,7 @@ function view(panel, all, body) {
   const names = [...new Map(all.map((curve) => [curve.name, curve])).values()];
   const lines = names.filter((curve) => !curve.dots && !curve.filled).length;
   const bounds = frameOf(all);
-  const height = panel.wide ? 520 : 420;
+  const height = panel.wide ? 520 : panel.third ? 340 : 420;
   let shown = all;
   const paths = (plot, index) => drawNamed(plot, shown.filter((curve) => curve.name === names[index - 1].name), lines);
   const options = {
