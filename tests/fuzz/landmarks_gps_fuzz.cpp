@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/linalg.hpp>
 
 #include "fuzz/landmark_checks.hpp"
 #include "fuzz/scratch.hpp"
@@ -21,7 +22,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::filesystem::path given = scratch.put("given", cairn_fuzz::text_of(data, size));
   for (const bool is_wheels : {false, true}) {
     fastslam::LandmarkLog log;
-    for (int k = 1; k <= 3; ++k) log.frames.push_back({1.0 * k, {cairn::SE2(1, 0, 0), {}}, {}});
+    for (int k = 1; k <= 3; ++k)
+      log.frames.push_back({1.0 * k, {cairn::SE2(1, 0, 0), cairn::Matrix<3>::Zero()}, {}});
     try {
       fastslam::read_gps(log, is_wheels ? fixes : given, is_wheels ? given : wheels);
     } catch (const cairn::Error&) {
