@@ -16,7 +16,7 @@
 namespace stereo_slam {
 namespace {
 
-constexpr const char* kind = "cairnmap";
+constexpr const char* file_kind = "cairnmap";
 constexpr std::uint64_t version = 2;  // 1 had five numbers of the rig
 
 void put(cairn::BinaryWriter& out, const Landmark& landmark) {
@@ -55,12 +55,12 @@ void save_map(const std::filesystem::path& path, const SavedMap& saved) {
   out.put(saved.steps);
   cairn::save_keyframe_map(out, saved.map);
   for (const Landmark& landmark : saved.landmarks) put(out, landmark);
-  cairn::write_file_atomically(path, out.file(kind, version));
+  cairn::write_file_atomically(path, out.file(file_kind, version));
 }
 
 SavedMap load_map(const std::filesystem::path& path) {
   const std::string bytes = cairn::read_file(path);
-  cairn::BinaryReader in(bytes, kind, version, path.string());
+  cairn::BinaryReader in(bytes, file_kind, version, path.string());
   const auto features = in.get<std::uint8_t>();
   if (features >= feature_names.size()) cairn::raise(path.string() + ": the kind of features is unknown");
   const bool oriented = in.get<std::uint8_t>() != 0;
