@@ -106,7 +106,8 @@ std::unique_ptr<DescriptorRival> make_our_cells(std::size_t dim, cairn::Descript
       [held] { return held->index->bytes(); }});
 }
 
-/// Exact search as a product of matrices, 128 queries at a time.
+/// Exact search as a product of matrices, 128 queries at a time. The best eight are ranked again by
+/// differences: a small distance is lost in the rounding of large products.
 std::vector<TwoNearest> search_by_product(const std::vector<float>& base, const std::vector<float>& queries,
                                           std::size_t dim) {
   using Matrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic>;
@@ -120,12 +121,15 @@ std::vector<TwoNearest> search_by_product(const std::vector<float>& base, const 
     const Eigen::Map<const Matrix> block(queries.data() + begin * dim, rows, size);
     const Matrix products = points.transpose() * block;
     for (Eigen::Index q = 0; q < size; ++q) {
-      const float own = block.col(q).squaredNorm();
-      cairn::NearestTwo<float> two;
+      std::array<cairn::Neighbor<float>, 8> best;
+      cairn::KNearest<float> nearest(best.data(), best.size());
       for (Eigen::Index i = 0; i < squares.size(); ++i)
-        two.offer(static_cast<cairn::PointId>(i), squares(i) - 2 * products(i, q));
-      found.push_back({two.id(), std::sqrt(std::max(0.0F, two.first_reduced() + own)),
-                       std::sqrt(two.second_reduced() + own)});
+        nearest.offer(static_cast<cairn::PointId>(i), squares(i) - 2 * products(i, q));
+      cairn::NearestTwo<float> two;
+      for (std::size_t k = 0; k < nearest.size(); ++k)
+        two.offer(best[k].id,
+                  (points.col(static_cast<Eigen::Index>(best[k].id)) - block.col(q)).squaredNorm());
+      found.push_back({two.id(), two.first(), two.second()});
     }
   }
   return found;
@@ -434,16 +438,17 @@ void score_descriptors(Scoreboard& board) {
                      .memory = Figure{20, 12}});
 }
 
-void score_a_million_descriptors(Scoreboard& board) {
-  {
-    const auto million = clustered_descriptors(1000000, 3);
-    const auto asked = noisy_copies(million, 500, 4);
-    score<64>(board,
-              {.name = "clusters, 64 numbers, n = 1e6",
-               .base = million,
-               .queries = asked,
-               .marks = {{"recall 0.95", 0.95, false, {2.5, 4}}, {"99 % of matches", 0.99, true, {2, 4}}}});
-  }
+void score_a_million_clustered(Scoreboard& board) {
+  const auto million = clustered_descriptors(1000000, 3);
+  const auto asked = noisy_copies(million, 500, 4);
+  score<64>(board,
+            {.name = "clusters, 64 numbers, n = 1e6",
+             .base = million,
+             .queries = asked,
+             .marks = {{"recall 0.95", 0.95, false, {2.5, 4}}, {"99 % of matches", 0.99, true, {2, 4}}}});
+}
+
+void score_a_million_of_pictures(Scoreboard& board) {
   const auto real = surf_of_pictures(1000000, 1000);
   if (!real) {
     board.add({.name = "SURF of pictures", .note = "no data"});
