@@ -5,11 +5,19 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
+#include <thread>
 
 #include <cairn/core/random.hpp>
 
 #include "support/bvecs.hpp"
 #include "support/data.hpp"
+
+#ifdef CAIRN_BENCH_PICTURES
+#include <cairn/vision/surf.hpp>
+
+#include "support/image_io.hpp"
+#endif
 
 namespace cairn_bench {
 namespace {
@@ -122,5 +130,44 @@ std::optional<Descriptors> sift() {
   return Descriptors{128, cairn_test::read_bvecs(*folder / "base.bvecs"),
                      cairn_test::read_bvecs(*folder / "query.bvecs")};
 }
+
+#ifdef CAIRN_BENCH_PICTURES
+std::optional<Descriptors> surf_of_pictures(std::size_t most, std::size_t queries) {
+  std::vector<std::filesystem::path> pictures;
+  for (const char* name : {"kitti_raw_0926", "kitti_odometry_a", "stereo_pairs"}) {
+    const auto folder = cairn_test::real_data(name);
+    if (!folder) continue;
+    for (const auto& entry : std::filesystem::recursive_directory_iterator(*folder))
+      if (entry.path().extension() == ".png") pictures.push_back(entry.path());
+  }
+  if (pictures.size() < 20) return std::nullopt;
+  std::sort(pictures.begin(), pictures.end());
+  cairn::SurfOptions options;
+  options.threshold = 0.5F;
+  options.target_count = static_cast<int>(most / pictures.size() * 5 / 4);
+  cairn::Surf surf(options, std::max(1U, std::thread::hardware_concurrency()));
+  Descriptors result{64, {}, {}};
+  std::vector<float> held_back;
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    const cairn::Image picture = example::read_image(pictures[i]);
+    const cairn::Features& found = surf(picture);
+    std::vector<float>& rows = i % 20 == 10 ? held_back : result.base;
+    for (std::size_t k = 0; k < found.size(); ++k) {
+      const auto row = found.descriptor(k);
+      rows.insert(rows.end(), row.begin(), row.end());
+    }
+  }
+  result.base.resize(std::min(result.base.size(), most * 64));
+  const std::size_t step = std::max<std::size_t>(1, held_back.size() / 64 / queries);
+  for (std::size_t i = 0; i + 64 <= held_back.size() && result.queries.size() < queries * 64; i += step * 64)
+    result.queries.insert(result.queries.end(), held_back.begin() + static_cast<std::ptrdiff_t>(i),
+                          held_back.begin() + static_cast<std::ptrdiff_t>(i + 64));
+  return result;
+}
+#else
+std::optional<Descriptors> surf_of_pictures(std::size_t, std::size_t) {
+  return std::nullopt;
+}
+#endif
 
 }  // namespace cairn_bench

@@ -36,5 +36,9 @@ struct Descriptors {
 Descriptors features(std::size_t count, std::size_t dim, std::uint64_t seed);
 /// 99,000 SIFT descriptors and 1,000 queries.
 std::optional<Descriptors> sift();
+/// SURF of the pictures of two drives through streets and of the stereo pairs, as many as there are but at
+/// most `most`, 64 numbers each, queries from every twentieth picture, which gives none to the set. Nothing
+/// without the pictures or what reads them.
+std::optional<Descriptors> surf_of_pictures(std::size_t most, std::size_t queries);
 
 }  // namespace cairn_bench

@@ -1,9 +1,9 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 //
-// SymphonyQG of RaBitQ-Library with the degree and the ef of construction that its documentation starts from:
-// 32 and 200. A budget is its ef. It gives ids; the distances are made here, as its own programs do where
-// they need them. Compiled for this processor: it has no other way.
+// SymphonyQG of RaBitQ-Library with the degree that its documentation starts from, 32. A budget is its ef. It
+// gives ids; the distances are made here, as its own programs do where they need them. Compiled for this
+// processor: it has no other way.
 #include <algorithm>
 #include <cmath>
 #include <iostream>
@@ -25,14 +25,15 @@ struct QuantizedGraph {
   std::unique_ptr<rabitqlib::symqg::QuantizedGraph<float>> graph;
   std::vector<float> rows;
   std::size_t dim;
-  explicit QuantizedGraph(std::size_t dimension) : dim(dimension) {}
+  std::size_t ef_of_construction;
+  QuantizedGraph(std::size_t dimension, std::size_t ef) : dim(dimension), ef_of_construction(ef) {}
 
   void build(const float* from, std::size_t count) {
     rows.assign(from, from + count * dim);
     std::ostringstream silent;  // it reports its progress
     std::streambuf* const out = std::cout.rdbuf(silent.rdbuf());
     graph = std::make_unique<rabitqlib::symqg::QuantizedGraph<float>>(count, dim, 32, rabitqlib::METRIC_L2);
-    rabitqlib::symqg::QGBuilder(*graph, 200, rows.data(), 1).build();
+    rabitqlib::symqg::QGBuilder(*graph, ef_of_construction, rows.data(), 1).build();
     std::cout.rdbuf(out);
   }
 
@@ -59,14 +60,15 @@ struct QuantizedGraph {
 
 }  // namespace
 
-std::unique_ptr<DescriptorRival> make_symphony_qg(std::size_t dim) {
-  auto held = std::make_shared<QuantizedGraph>(dim);
+std::unique_ptr<DescriptorRival> make_symphony_qg(std::size_t dim, std::size_t ef) {
+  auto held = std::make_shared<QuantizedGraph>(dim, ef);
   return std::make_unique<DescriptorRival>(
-      DescriptorRival{"SymphonyQG", [=](const float* rows, std::size_t count) { held->build(rows, count); },
+      DescriptorRival{"SymphonyQG ef " + std::to_string(ef),
+                      [=](const float* rows, std::size_t count) { held->build(rows, count); },
                       [=](const std::vector<float>& queries, int ef) { return held->search(queries, ef); }});
 }
 #else
-std::unique_ptr<DescriptorRival> make_symphony_qg(std::size_t) {
+std::unique_ptr<DescriptorRival> make_symphony_qg(std::size_t, std::size_t) {
   return nullptr;
 }
 #endif

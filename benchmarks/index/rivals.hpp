@@ -43,6 +43,8 @@ struct GrowingRival {
   std::function<float(const Point3&)> nearest;
 };
 std::unique_ptr<GrowingRival> make_nanoflann_dynamic(const std::vector<Point3>& points);
+/// Null where nanoflann is older than 1.10 too.
+std::unique_ptr<GrowingRival> make_nanoflann_incremental(const std::vector<Point3>& points);
 std::unique_ptr<GrowingRival> make_ikd_tree(const std::vector<Point3>& points);
 
 /// Two nearest descriptors with a budget of checks. Ids count from the first descriptor added.
@@ -65,12 +67,15 @@ struct DescriptorRival {
   std::string name;
   std::function<void(const float* rows, std::size_t count)> add;
   std::function<std::vector<TwoNearest>(const std::vector<float>& queries, int checks)> search;
+  std::function<std::size_t()> bytes{};  ///< held beside the rows that were added; of our own ways
 };
 std::unique_ptr<DescriptorRival> make_flann_trees(std::size_t dim, int trees);
 std::unique_ptr<DescriptorRival> make_hnswlib(std::size_t dim);
 /// Only for coordinates that are whole numbers from 0 to 255.
 std::unique_ptr<DescriptorRival> make_hnswlib_of_bytes(std::size_t dim);
 std::unique_ptr<DescriptorRival> make_faiss_ivf(std::size_t dim);
-std::unique_ptr<DescriptorRival> make_symphony_qg(std::size_t dim);
+/// `ef` is that of its construction; 100 and 200 are asked, since neither is always the better.
+std::unique_ptr<DescriptorRival> make_symphony_qg(std::size_t dim, std::size_t ef);
+std::unique_ptr<DescriptorRival> make_glass(std::size_t dim);
 
 }  // namespace cairn_bench
