@@ -87,15 +87,27 @@ struct Canvas {
   [[nodiscard]] float row(const cairn::SE2& p) const { return static_cast<float>((top - p.y()) / pixel); }
 };
 
+/// Where a map lies.
+struct Extent {
+  double cell_size, left, bottom;  // [m]
+  int width, height;               // [cells]
+};
+Extent extent_of(const MapImage& map) {
+  return {map.cell_size, map.left, map.bottom, map.image.width(), map.image.height()};
+}
+Extent extent_of(const PackedMap& map) {
+  return {map.cell_size, map.left, map.bottom, map.width, map.height};
+}
+
 /// Of all these maps, and with no more pixels than a page shows.
-Canvas canvas_of(const std::vector<const PackedMap*>& maps) {
-  double left = maps.front()->left, bottom = maps.front()->bottom, right = left, top = bottom;
-  const double cell = maps.front()->cell_size;
-  for (const PackedMap* m : maps) {
-    left = std::min(left, m->left);
-    bottom = std::min(bottom, m->bottom);
-    right = std::max(right, m->left + cell * m->width);
-    top = std::max(top, m->bottom + cell * m->height);
+Canvas canvas_of(const std::vector<Extent>& maps) {
+  double left = maps.front().left, bottom = maps.front().bottom, right = left, top = bottom;
+  const double cell = maps.front().cell_size;
+  for (const Extent& m : maps) {
+    left = std::min(left, m.left);
+    bottom = std::min(bottom, m.bottom);
+    right = std::max(right, m.left + cell * m.width);
+    top = std::max(top, m.bottom + cell * m.height);
   }
   constexpr double most = 1400;  // pixels
   Canvas canvas{left, top,
@@ -135,8 +147,7 @@ constexpr const char* ancestors =
     " The particles' paths lie on each other where they have an ancestor in common.";
 
 void add_map(example::Report& page, const Results& r) {
-  const PackedMap map(r.map);
-  const Canvas canvas = canvas_of({&map});
+  const Canvas canvas = canvas_of({extent_of(r.map)});
   example::Marks all = marked("all particles' paths", Ink::violet), path = marked("path", Ink::belief);
   for (const auto& each : r.paths)
     for (std::size_t k = 1; k < each.size(); ++k) add_step(all, canvas, each[k - 1], each[k]);
@@ -154,8 +165,8 @@ void add_map(example::Report& page, const Results& r) {
 
 /// The map as it grew.
 void add_film(example::Report& page, const Results& r) {
-  std::vector<const PackedMap*> maps;
-  for (const Snapshot& s : r.snapshots) maps.push_back(&s.map);
+  std::vector<Extent> maps;
+  for (const Snapshot& s : r.snapshots) maps.push_back(extent_of(s.map));
   const Canvas canvas = canvas_of(maps);
   example::PictureFilm film{.title = "The map as it grew",
                             .caption = "The map of the particle that was best at each time, " +
