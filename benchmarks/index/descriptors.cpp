@@ -282,8 +282,8 @@ std::string described(const Entrant& entrant, const Timing& timing) {
 
 /// The rows of one mark: all who reach it take turns, and the fastest of ours is held against the rivals.
 void score_mark(Scoreboard& board, const Task& task, const Mark& mark, std::size_t dim,
-                const std::vector<Built>& own, const std::vector<Built>& rivals) {
-  const auto exact = search_by_product(task.base, task.queries, dim);
+                const std::vector<TwoNearest>& exact, const std::vector<Built>& own,
+                const std::vector<Built>& rivals) {
   std::vector<Entrant> entrants = reaching(own, task.queries, exact, mark, task.base.size() / dim / 8);
   const std::size_t us_end = entrants.size();
   for (const Entrant& rival : reaching(rivals, task.queries, exact, mark, 8192)) entrants.push_back(rival);
@@ -329,7 +329,8 @@ void score_mark(Scoreboard& board, const Task& task, const Mark& mark, std::size
 template <std::size_t Dim>
 void score(Scoreboard& board, const Task& task) {
   const Field<Dim> field(task.base, task.queries);
-  for (const Mark& mark : task.marks) score_mark(board, task, mark, Dim, field.ours, field.rivals);
+  const auto exact = search_by_product(task.base, task.queries, Dim);
+  for (const Mark& mark : task.marks) score_mark(board, task, mark, Dim, exact, field.ours, field.rivals);
   const Built& cells = field.ours[1];
   if (task.build) {
     std::optional<double> theirs;
