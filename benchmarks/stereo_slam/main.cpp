@@ -6,7 +6,9 @@
 /// on recorded drives, time, and what a map costs that lasts. CAIRN_ARENA_SEEDS says how many seeds (3; a
 /// script of a new seed is rendered first, which takes minutes), CAIRN_VIDEO_MINUTES how long the arena is
 /// looped (6; an hour is 60, and takes a quarter of one), CAIRN_STEREO_ROWS which rows are wanted, by
-/// commas: arena,joint,drives,return,drift,relocalisation,rate,stores,starry_night,video (all).
+/// commas: arena,joint,drives,return,drift,relocalisation,rate,stores,starry_night,video (all). CAIRN_DRIVES
+/// names further drives, kitti_odometry=DIR,euroc=DIR; CAIRN_RIVAL_PATHS a folder of paths that other systems
+/// came to, DRIVE.NAME.txt, one KITTI row a frame.
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
@@ -21,56 +23,30 @@
 #include <unistd.h>
 
 #include <cairn/core/random.hpp>
-#include <cairn/eval/kitti_metric.hpp>
 #include <cairn/eval/trajectory_error.hpp>
 #include <cairn/io/text.hpp>
 
 #include "arena_dataset.hpp"
 #include "arena_script.hpp"
 #include "dataset.hpp"
+#include "drives.hpp"
 #include "frames_ahead.hpp"
 #include "joint.hpp"
 #include "lasting.hpp"
 #include "pipeline.hpp"
-#include "receiver_heights.hpp"
-#include "reference_mounting.hpp"
+#include "runs.hpp"
 #include "saved_map.hpp"
 #include "starry_night.hpp"
 #include "stopwatch.hpp"
 #include "summary.hpp"
 #include "support/scoreboard.hpp"
-#include "there_and_back.hpp"
 
 namespace {
 
 namespace fs = std::filesystem;
-using cairn_bench::Row;
 using cairn_bench::Scoreboard;
-
-struct Run {
-  stereo_slam::RunRecord record;
-  stereo_slam::Summary summary;
-  double cpu_milliseconds = 0;  ///< of a pair, without reading it
-};
-
-Run run(const stereo_slam::DatasetOptions& what, stereo_slam::PipelineOptions how, bool and_back = false) {
-  std::cout << "running " << what.kind << ' '
-            << (what.folder.empty() ? what.arena.script : what.folder.string()) << ", seed " << how.seed
-            << std::endl;
-  auto frames = stereo_slam::open_dataset(what);
-  if (and_back) frames = stereo_slam::there_and_back(std::move(frames));
-  stereo_slam::Pipeline pipeline(frames->rig(), how);
-  double cpu = 0;
-  for (std::size_t i = 0; i < frames->size(); ++i) {
-    const stereo_slam::StereoFrame frame = frames->frame(i);
-    const std::clock_t start = std::clock();
-    pipeline.step(frame);
-    cpu += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
-  }
-  Run result{pipeline.record(), {}, 1e3 * cpu / static_cast<double>(frames->size())};
-  result.summary = stereo_slam::summarise(result.record);
-  return result;
-}
+using stereo_slam_bench::Run;
+using stereo_slam_bench::run;
 
 Run run_arena(const std::string& script, std::uint64_t seed) {
   stereo_slam::DatasetOptions what;
@@ -204,141 +180,6 @@ void add_drift_row(Scoreboard& board) {
              .note = "--drift 0.05 --calibrate drifting"});
 }
 
-fs::path data_folder() {
-  const char* data = std::getenv("CAIRN_DATA");
-  return data != nullptr ? data : "../shared/data";
-}
-
-std::optional<Run> run_drive(const std::string& name, const std::string& kind,
-                             stereo_slam::Calibration calibrate, bool and_back = false) {
-  stereo_slam::DatasetOptions what;
-  what.kind = kind;
-  what.folder = data_folder() / name;
-  if (!fs::exists(what.folder)) return std::nullopt;
-  stereo_slam::PipelineOptions how;
-  how.calibrate = calibrate;
-  return run(what, how, and_back);
-}
-
-/// A row of a drive, or why there is none.
-void add(Scoreboard& board, Row row, const std::optional<double>& measured, bool data) {
-  row.measured = measured;
-  if (!measured) row.note = data ? "no value" : "no data";
-  board.add(std::move(row));
-}
-
-/// The first 12 poses of the reference are filled in (docs/design.md): the drive begins after them.
-void add_odometry_rows(Scoreboard& board, stereo_slam::Calibration calibrate) {
-  const auto drive = run_drive("kitti_odometry_a", "kitti_odometry", calibrate);
-  const std::string name = std::string("kitti_odometry_a from frame 12") +
-                           (calibrate == stereo_slam::Calibration::off ? ", --calibrate off" : "");
-  std::optional<double> end, ate, lost;
-  std::optional<stereo_slam::MountedConsistency> consistency;
-  if (drive) {
-    std::vector<cairn::PosePair> pairs = stereo_slam::truth_pairs(drive->record);
-    pairs.erase(pairs.begin(), pairs.begin() + 12);
-    const cairn::SE3 E = (pairs.front().estimate.inverse() * pairs.back().estimate).inverse() *
-                         (pairs.front().truth.inverse() * pairs.back().truth);
-    end = 100 * E.translation().norm() / cairn::path_distances(pairs).back();
-    ate = cairn::absolute_error(pairs)->translation.rmse;
-    lost = static_cast<double>(drive->summary.frames_lost);
-    consistency = stereo_slam::mounted_consistency(drive->record.frames, 12);
-  }
-  add(board, {.name = name + ": end error over the path", .unit = "%", .must = 0.6, .aim = 0.4}, end,
-      drive.has_value());
-  add(board, {.name = name + ": ATE", .unit = "m", .must = 0.05, .aim = 0.025}, ate, drive.has_value());
-  add(board, {.name = name + ": frames lost", .unit = "", .must = 0}, lost, drive.has_value());
-  add(board, {.name = name + ": NEES of the pose", .unit = "of 6"},
-      consistency ? std::optional(consistency->nees_as_given) : std::nullopt, drive.has_value());
-  std::string mounting;
-  for (int i = 0; consistency && i < 3; ++i)
-    mounting += (i == 0 ? "by " : ", ") + cairn::shortest(std::round(1e4 * consistency->turn(i)) / 10);
-  add(board,
-      {.name = name + ": the same, the reference turned against the camera",
-       .unit = "of 6",
-       .note = mounting + " mrad"},
-      consistency ? std::optional(consistency->nees) : std::nullopt, drive.has_value());
-  if (calibrate == stereo_slam::Calibration::automatic)
-    add(board, {.name = "CPU a pair at 1226 x 370", .unit = "ms", .must = 45, .aim = 24},
-        drive ? std::optional(drive->cpu_milliseconds) : std::nullopt, drive.has_value());
-}
-
-/// In the ground plane, because the altitude of the satellite receiver is not that of the car: it climbs by
-/// 0.7 m between the frames 25 and 45, where the same receiver's upward velocity says that it does not, so
-/// that from frame 50 on the reference is believed sideways, ahead and in heading. Besides, the reference
-/// with its heights by that velocity.
-void add_raw_rows(Scoreboard& board, stereo_slam::Calibration calibrate) {
-  const auto drive = run_drive("kitti_raw_0926", "kitti_raw", calibrate);
-  const std::string name =
-      std::string("kitti_raw_0926") + (calibrate == stereo_slam::Calibration::off ? ", --calibrate off" : "");
-  std::optional<double> ate, over25, over50, by_velocity50, level25, level50, lost, nees, level_nees;
-  if (drive) {
-    std::vector<cairn::PosePair> pairs = stereo_slam::truth_pairs(drive->record);
-    lost = static_cast<double>(drive->summary.frames_lost);
-    if (const auto all = stereo_slam::mounted_consistency(drive->record.frames, 0)) nees = all->nees_as_given;
-    level_nees = stereo_slam::level_nees(drive->record.frames, 50);
-    const auto mean_over = [&](double length, std::optional<double>& to) {
-      if (const auto error = cairn::kitti_error(pairs, {.lengths = {length}, .step = 1}))
-        to = error->overall.translation_percent();
-    };
-    mean_over(25, over25);
-    mean_over(50, over50);
-    const stereo_slam_bench::ReceiverHeights heights(data_folder() / "kitti_raw_0926");
-    if (!heights.empty()) {
-      // The reference of a frame is what the receiver said 0.1 s earlier, as its file says.
-      constexpr double behind = 0.1;
-      const double start = drive->record.frames.front().time;
-      const std::vector<cairn::PosePair> as_given = pairs;
-      for (cairn::PosePair& pair : pairs) {
-        cairn::Vector<3> place = pair.truth.translation();
-        place(1) += heights.slip(pair.time - start - behind);  // y points down
-        pair.truth = cairn::SE3(pair.truth.rotation(), place);
-      }
-      mean_over(50, by_velocity50);
-      pairs = as_given;
-    }
-    for (cairn::PosePair& pair : pairs)
-      for (cairn::SE3* pose : {&pair.truth, &pair.estimate}) {
-        cairn::Vector<3> flat = pose->translation();
-        flat(1) = 0;
-        *pose = cairn::SE3(pose->rotation(), flat);
-      }
-    mean_over(25, level25);
-    mean_over(50, level50);
-    ate = cairn::absolute_error(pairs)->translation.rmse;
-  }
-  add(board, {.name = name + ": horizontal ATE", .unit = "m", .must = 0.09, .aim = 0.07}, ate,
-      drive.has_value());
-  add(board, {.name = name + ": mean error over 25 m", .unit = "%"}, over25, drive.has_value());
-  add(board, {.name = name + ": mean error over 50 m", .unit = "%", .must = 1.2, .aim = 1.0}, over50,
-      drive.has_value());
-  add(board,
-      {.name = name + ": mean error over 50 m, heights by the receiver's upward velocity", .unit = "%"},
-      by_velocity50, drive.has_value());
-  add(board, {.name = name + ": mean error over 25 m in the ground plane", .unit = "%"}, level25,
-      drive.has_value());
-  add(board, {.name = name + ": mean error over 50 m in the ground plane", .unit = "%"}, level50,
-      drive.has_value());
-  add(board, {.name = name + ": frames lost", .unit = "", .must = 0}, lost, drive.has_value());
-  add(board, {.name = name + ": NEES of the pose", .unit = "of 6"}, nees, drive.has_value());
-  add(board, {.name = name + " from frame 50: NEES sideways, ahead and in heading", .unit = "of 3"},
-      level_nees, drive.has_value());
-}
-
-/// Without any truth: the frames of the drive forwards, then backwards.
-void add_return_row(Scoreboard& board) {
-  const auto drive =
-      run_drive("kitti_raw_0926", "kitti_raw", stereo_slam::Calibration::automatic, /*and_back=*/true);
-  std::optional<double> off;
-  if (drive) off = stereo_slam::return_error(drive->record.frames).percent();
-  add(board,
-      {.name = "kitti_raw_0926 forwards then backwards: off the start, over the path",
-       .unit = "%",
-       .must = 0.2,
-       .aim = 0.02},
-      off, drive.has_value());
-}
-
 /// Views near the path of a map that was saved and loaded, each by itself: up to half a metre beside it,
 /// turned by up to fifteen degrees.
 void add_relocalisation_rows(Scoreboard& board) {
@@ -429,12 +270,9 @@ int main(int argc, char** argv) {
     stereo_slam_bench::add_hour_rows(board, 600 * video_minutes());  // its memory is ours: first
   if (wanted("arena")) add_arena_rows(board);
   if (wanted("joint")) stereo_slam_bench::add_joint_rows(board);
-  for (const auto calibrate : {stereo_slam::Calibration::automatic, stereo_slam::Calibration::off}) {
-    if (!wanted("drives")) break;
-    add_odometry_rows(board, calibrate);
-    add_raw_rows(board, calibrate);
-  }
-  if (wanted("return")) add_return_row(board);
+  if (wanted("drives")) stereo_slam_bench::add_drive_rows(board);
+  stereo_slam_bench::add_given_drive_rows(board);
+  if (wanted("return")) stereo_slam_bench::add_return_row(board);
   if (wanted("drift")) add_drift_row(board);
   if (wanted("relocalisation")) add_relocalisation_rows(board);
   if (wanted("starry_night")) stereo_slam_bench::add_starry_night_rows(board);
