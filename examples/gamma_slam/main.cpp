@@ -9,7 +9,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -68,8 +67,8 @@ int main(int argc, char** argv) {
   CLI::App app{"Maps rough ground by the spread of its heights: particles over a rendered terrain."};
   app.add_option("--cells", options.cells,
                  "what a cell keeps: heights (mean and spread) or variance (spread)")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, Cells>{{"heights", Cells::heights}, {"variance", Cells::variance}}));
+      ->transform(example::one_of<Cells>({{"heights", Cells::heights}, {"variance", Cells::variance}}))
+      ->type_name("NAME");
   app.add_option("--cell-size", options.map.geometry.cell_size, "[m]")
       ->check(example::number_between(0.05, 2));
 #ifdef GAMMA_SLAM_HAS_RECORDINGS

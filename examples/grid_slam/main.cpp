@@ -8,7 +8,6 @@
 #include <filesystem>
 #include <functional>
 #include <iostream>
-#include <map>
 #include <optional>
 #include <string>
 #include <thread>
@@ -158,12 +157,14 @@ int main(int argc, char** argv) {
       ->excludes(log);
   app.add_option("--map", options.map,
                  "tiles: occupancy, scans matched; stop, ancestry: DP-SLAM on shared tiles or on its tree")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, Maps>{
-          {"tiles", Maps::tiles}, {"ancestry", Maps::ancestry}, {"stop", Maps::stop}}));
+      ->transform(
+          example::one_of<Maps>({{"tiles", Maps::tiles}, {"stop", Maps::stop}, {"ancestry", Maps::ancestry}}))
+      ->type_name("NAME");
   app.add_option("--proposal", options.proposal,
                  "of --map stop and ancestry: poses drawn from odometry (motion), or where the scan matches")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, StopProposal>{
-          {"motion", StopProposal::motion}, {"match", StopProposal::match}}));
+      ->transform(
+          example::one_of<StopProposal>({{"motion", StopProposal::motion}, {"match", StopProposal::match}}))
+      ->type_name("NAME");
   app.add_option("--relations", options.relations,
                  "relations to measure the path by: t1 t2 x y z roll pitch yaw");
   app.add_option("--out", options.out, "folder for the map, the trajectory, the summary and the report");

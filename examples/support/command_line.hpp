@@ -15,6 +15,8 @@
 #include <sstream>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
@@ -70,6 +72,23 @@ inline CLI::Validator number_between(double low, double high) {
             return "expected a number from " + range + ", found " + detail::shown(word);
           },
           range};
+}
+
+/// Takes one of the names and sets the enumerator that it stands for: option->transform(one_of<Kind>({...})).
+/// Their order is that of --help.
+template <class Enumeration>
+CLI::Validator one_of(std::vector<std::pair<std::string, Enumeration>> named) {
+  std::string names;
+  for (const auto& [name, value] : named) names += (names.empty() ? "" : ", ") + name;
+  return {[named = std::move(named), names](std::string& word) {
+            for (const auto& [name, value] : named) {
+              if (word != name) continue;
+              word = std::to_string(static_cast<int>(value));  // as CLI11 reads enumerators
+              return std::string();
+            }
+            return "expected one of " + names + ", found " + detail::shown(word);
+          },
+          names};
 }
 
 /// Does a program's work, which returns an exit code. What it throws is said in a line, and so is a standard
