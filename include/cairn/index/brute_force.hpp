@@ -80,7 +80,7 @@ public:
 
   /// Offers every point that is nearer than the collector's limit, in the order of the set. Returns true:
   /// nothing is left out.
-  template <Point Query, Collector<Real> C>
+  template <QueryPoint Query, Collector<Real> C>
   bool search(const Query& query, C& collector, Work* work = nullptr) const {
     detail::check_collector<C, M>();
     if (empty()) return true;
@@ -97,11 +97,11 @@ public:
     return true;
   }
   /// The same: here a budget leaves nothing out.
-  template <Point Query, Collector<Real> C>
+  template <QueryPoint Query, Collector<Real> C>
   bool search(const Query& query, C& collector, const SearchOptions& options) const {
     return search(query, collector, options.work);
   }
-  template <Point Query, Collector<Real> C>
+  template <QueryPoint Query, Collector<Real> C>
   bool search(const Query& query, C& collector, const SearchOptions& options, Scratch&) const {
     return search(query, collector, options.work);
   }

@@ -38,7 +38,8 @@ namespace cairn { inline namespace CAIRN_ABI {
 
 /// Points with one coordinate more. Refers to the set, which must live as long; what joins it afterwards is
 /// seen after extend().
-template <PointSet Points>
+template <class Points>
+  requires(PointSet<Points> || detail::explain_points<Points>)
 class InnerProductPoints {
 public:
   /// One point, seen so; valid as long as the set's point is.
@@ -91,7 +92,7 @@ public:
   [[nodiscard]] float longest() const noexcept { return longest_; }
 
   /// A query with its zero. Throws Error where it is not finite or of another dimension than the points.
-  template <Point Query>
+  template <QueryPoint Query>
   [[nodiscard]] std::vector<float> lifted(const Query& query) const {
     std::vector<float> row(dim_ + 1, 0.0F);
     detail::copy_point<float>(query, dim_, row.data(), {"InnerProductPoints: query", 0});
@@ -143,7 +144,7 @@ struct ProductHit {
 
 /// The k points of the largest products with the query, largest first, of equal ones the smaller id: of all
 /// or, under a budget, of those that the search meets. `index` is one over `points`. Throws as lifted().
-template <class Index, PointSet Points, Point Query>
+template <class Index, PointSet Points, QueryPoint Query>
 [[nodiscard]] std::vector<ProductHit> largest_products(const Index& index,
                                                        const InnerProductPoints<Points>& points,
                                                        const Query& query, std::size_t k,

@@ -128,11 +128,11 @@ public:
 
   /// As BestBinFirst; `scratch` keeps memory from search to search. Returns true where nothing nearer was
   /// left out.
-  template <Point Query, Collector<float> C>
+  template <QueryPoint Query, Collector<float> C>
   bool search(const Query& query, C& collector, const SearchOptions& options, Scratch& scratch) const {
     return scratch.search(*this, query, collector, options.budget, options.work);
   }
-  template <Point Query, Collector<float> C>
+  template <QueryPoint Query, Collector<float> C>
   bool search(const Query& query, C& collector, const SearchOptions& options = {}) const {
     Scratch scratch;
     return search(query, collector, options, scratch);
@@ -318,7 +318,7 @@ public:
   /// Offers each point at most once, with its distance as BruteForce computes it. Throws Error where the
   /// query is not finite or of another dimension. Returns true where the answer is exact. `budget` is for all
   /// trees together.
-  template <Point Query, Collector<float> C>
+  template <QueryPoint Query, Collector<float> C>
   bool search(const KdForest<Dim>& forest, const Query& query, C& collector, Budget budget = {},
               Work* work = nullptr) {
     detail::check_collector<C, L2>();

@@ -150,7 +150,7 @@ public:
   /// Shows a collector every point nearer than its limit (and perhaps others), near ones early. Adds to
   /// `work` what was done. Throws Error where a coordinate of the query is not finite. Returns true: nothing
   /// is left out.
-  template <Point Query, Collector<Real> C>
+  template <QueryPoint Query, Collector<Real> C>
   bool search(const Query& query, C& collector, Work* work = nullptr) const {
     detail::check_collector<C, M>();
     if (empty()) return true;
@@ -165,12 +165,12 @@ public:
 
   /// The same where there is no budget; under one as BestBinFirst, whose queue `scratch` keeps from search to
   /// search. Returns true where nothing nearer was left out.
-  template <Point Query, Collector<Real> C>
+  template <QueryPoint Query, Collector<Real> C>
   bool search(const Query& query, C& collector, const SearchOptions& options, Scratch& scratch) const {
     if (options.budget.unlimited()) return search(query, collector, options.work);
     return scratch.search(*this, query, collector, options.budget, options.work);
   }
-  template <Point Query, Collector<Real> C>
+  template <QueryPoint Query, Collector<Real> C>
   bool search(const Query& query, C& collector, const SearchOptions& options) const {
     Scratch scratch;
     return search(query, collector, options, scratch);

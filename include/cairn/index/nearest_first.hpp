@@ -65,7 +65,7 @@ public:
   using Hit = typename Tree::Hit;
 
   /// Throws Error where the query is not finite or of another dimension.
-  template <Point Query>
+  template <QueryPoint Query>
     requires detail::is_kd_tree<Tree>
   NearestFirst(const Tree& tree, const Query& query) : tree_(&tree), query_(tree.dimension()) {
     if (tree.empty()) return;
@@ -73,7 +73,7 @@ public:
     detail::wrap_row(tree.metric(), query_.size(), query_.data());
     cells_.push_back({0, 0, 0, {}});
   }
-  template <Point Query>
+  template <QueryPoint Query>
   NearestFirst(const Tree&&, const Query&) = delete;  ///< would be gone
 
   /// The next nearest point, with its true distance; nothing when all have been given.
@@ -139,7 +139,7 @@ private:
   std::vector<Cell> cells_;
   detail::HitQueue<Hit> hits_;
 };
-template <class Tree, Point Query>
+template <class Tree, QueryPoint Query>
 NearestFirst(const Tree&, const Query&) -> NearestFirst<Tree>;
 
 /// The same of BruteForce: the first call costs O(n), each further one O(log n).
@@ -150,7 +150,7 @@ public:
   using Real = typename Index::Real;
   using Hit = typename Index::Hit;
 
-  template <Point Query>
+  template <QueryPoint Query>
   NearestFirst(const Index& index, const Query& query) : metric_(index.metric()) {
     index.search(query, hits_);
   }
