@@ -67,7 +67,7 @@ enum class DescriptorCodes {
 };
 
 struct DescriptorIndexOptions {
-  /// Mean number of points in a cell, up to a factor of 1.5. 0: sqrt(n) / 6, but at least 32, where scanning
+  /// Mean number of points in a cell, up to a factor of 1.5. 0: sqrt(n) / 5, but at least 32, where scanning
   /// the means costs about as much as scanning the cells.
   std::size_t points_in_cell = 0;
   unsigned rounds = 5;   ///< of moving the cells to their means; 0 leaves the kd-tree's
@@ -617,16 +617,20 @@ private:
     error_ = error;
   }
 
-  /// Whether a set of so many points is searched faster by codes: below, bytes are in the cache anyhow.
+  /// Whether a set of so many points is searched faster by codes: below, bytes are in the cache anyhow. Of 64
+  /// coordinates codes with their numbers are three lines of 64 bytes where the bytes are sixteen, which pays
+  /// once the bytes outgrow the last cache.
   [[nodiscard]] bool codes_pay(std::size_t count) const noexcept {
     if (options_.codes != DescriptorCodes::automatic) return options_.codes == DescriptorCodes::on;
-    return dimension() >= 96 && count * dimension() >= std::size_t{1} << 22U;
+    const std::size_t bytes = count * dimension();
+    return (dimension() >= 96 && bytes >= std::size_t{1} << 22U) ||
+           (dimension() >= 64 && bytes >= std::size_t{1} << 25U);
   }
 
   [[nodiscard]] std::size_t in_cell() const noexcept {
     if (options_.points_in_cell > 0) return options_.points_in_cell;
     return std::max<std::size_t>(2 * detail::block_size,
-                                 static_cast<std::size_t>(std::sqrt(static_cast<double>(size_)) / 6));
+                                 static_cast<std::size_t>(std::sqrt(static_cast<double>(size_)) / 5));
   }
 
   [[nodiscard]] float reduced_distance(const float* query, PointId id) const {
