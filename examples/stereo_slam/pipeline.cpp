@@ -55,7 +55,6 @@ FeatureOptions feature_options(const PipelineOptions& options) {
 Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options)
     : options_(options),
       rig_(rig),
-      front_end_(feature_options(options), options.threads),
       match_stereo_(std::make_shared<const StereoMatcher>(rig, options.stereo)),
       triangulate_(rig, triangulation_options(options, rig)),
       calibration_(rig, options.calibration),
@@ -101,8 +100,9 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options, 
 }
 
 const FrameRecord& Pipeline::step(const StereoFrame& frame, double load_milliseconds) {
-  front_end_.keep(budget_.points());
-  return step(frame, front_end_(frame, match_stereo_), load_milliseconds);
+  if (!front_end_) front_end_.emplace(feature_options(options_), options_.threads);
+  front_end_->keep(budget_.points());
+  return step(frame, (*front_end_)(frame, match_stereo_), load_milliseconds);
 }
 
 const FrameRecord& Pipeline::step(const StereoFrame& frame, const FramePoints& points,
