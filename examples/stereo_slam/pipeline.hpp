@@ -197,7 +197,7 @@ private:
 
   PipelineOptions options_;
   cairn::StereoRig rig_;
-  std::optional<FrontEnd> front_end_;  // made for the first frame that comes without points
+  std::optional<FrontEnd> front_end_;      // made for the first frame that comes without points
   const cairn::Features* left_ = nullptr;  // of the frame that is worked on
   std::shared_ptr<const StereoMatcher> match_stereo_;
   cairn::Triangulator triangulate_;
