@@ -137,6 +137,46 @@ TEST_SUITE("fastslam/slam") {
     CHECK(cairn::chi_square_mean_band(3, 5, 0.999).contains(nees.mean()));
   }
 
+  TEST_CASE("fastslam: millimetres of slip bend no path that is drawn about places known to decimetres") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    LandmarkLog log = simulated(loop_map(), seed, 400);
+    for (Frame& frame : log.frames) frame.moved.covariance(1, 1) = std::pow(1e-3, 2);
+    const PathDensity density(log, growing_batch_optimum(log));
+    cairn::Random random(seed);
+    double across = 0;  // of the motions' residuals
+    constexpr int draws = 10;
+    for (int i = 0; i < draws; ++i) {
+      const std::vector<SE2> path = density.draw(random);
+      for (std::size_t k = 1; k < path.size(); ++k)
+        across += std::pow(cairn::local(path[k - 1] * log.frames[k].moved.mean, path[k])(1), 2);
+    }
+    across = std::sqrt(across / (draws * static_cast<double>(log.frames.size())));
+    MESSAGE("across ", across, " m");
+    CHECK(across < 1.5e-3);
+  }
+
+  TEST_CASE("fastslam: paths drawn again leave most of their weights, and a spread that the truth is in") {
+    constexpr std::uint64_t runs = 8;
+    cairn::RunningMoments nees;
+    for (std::uint64_t seed = 1; seed <= runs; ++seed) {
+      const LandmarkLog log = simulated(loop_map(), seed, 300);
+      const Results r = run(log, {.particles = 60, .seed = seed});
+      std::size_t redrawn = 0;
+      for (const StepRecord& step : r.steps) {
+        if (!step.redrawn) continue;
+        ++redrawn;
+        CHECK(*step.redrawn >= 0.5 * 60 - 1e-9);
+        nees.add(*step.nees);
+      }
+      CHECK(redrawn >= 11);
+      CHECK(r.steps.back().redrawn.has_value());
+    }
+    MESSAGE("NEES ", nees.mean());
+    CHECK(nees.mean() > 2);
+    CHECK(nees.mean() < 4.5);
+  }
+
   TEST_CASE("fastslam: with the start known NEES is about its number of dimensions, for both filters") {
     cairn::RunningMoments particles, joint;
     for (std::uint64_t seed = 1; seed <= 8; ++seed) {
