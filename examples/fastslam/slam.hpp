@@ -37,7 +37,7 @@ struct SlamOptions {
   /// names under the associations of one particle. Every so many frames and an eighth of those before,
   /// whichever is more, so that a log costs O(its length) times its logarithm, and at the log's end. 0:
   /// never, which is FastSLAM as published.
-  std::size_t redraw_every = 25;
+  std::size_t redraw_every = 100;
   cairn::LandmarkOptions landmarks{.pick = cairn::Pick::drawn, .gate = 0.999};
 };
 

@@ -161,7 +161,7 @@ TEST_SUITE("fastslam/slam") {
     cairn::RunningMoments nees;
     for (std::uint64_t seed = 1; seed <= runs; ++seed) {
       const LandmarkLog log = simulated(loop_map(), seed, 300);
-      const Results r = run(log, {.particles = 60, .seed = seed});
+      const Results r = run(log, {.particles = 60, .seed = seed, .redraw_every = 25});
       std::size_t redrawn = 0;
       for (const StepRecord& step : r.steps) {
         if (!step.redrawn) continue;
