@@ -236,12 +236,15 @@ double PathDensity::log_density(const std::vector<SE2>& poses) const {
   }
   const Eigen::VectorXd v = h.selfadjointView<Eigen::Lower>() * e;
   double squared = e.dot(v);
+  double log_determinant = root.vectorD().array().log().sum();  // of the poses' share of h, in the end
   for (int row = 3 * static_cast<int>(poses.size()); row < h.rows(); row += 2) {
     Matrix<2> block;
     block << h.coeff(row, row), h.coeff(row + 1, row), h.coeff(row + 1, row), h.coeff(row + 1, row + 1);
-    squared -= cairn::Cholesky<2>(block).whiten(Vector<2>(v.segment<2>(row))).squaredNorm();
+    const cairn::Cholesky<2> landmark(block);
+    squared -= landmark.whiten(Vector<2>(v.segment<2>(row))).squaredNorm();
+    log_determinant -= landmark.log_determinant();
   }
-  return -0.5 * squared;
+  return 0.5 * (log_determinant - squared);
 }
 
 }  // namespace fastslam

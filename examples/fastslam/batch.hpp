@@ -54,7 +54,7 @@ public:
   /// The path of so many numbers, which are independent and standard normal where it is a draw.
   [[nodiscard]] std::vector<cairn::SE2> path(const std::vector<double>& white) const;
   [[nodiscard]] std::vector<cairn::SE2> draw(cairn::Random& random) const;
-  /// But for a constant.
+  /// But for the power of 2 pi, which all paths of as many poses share, whatever was seen.
   [[nodiscard]] double log_density(const std::vector<cairn::SE2>& poses) const;
 
 private:

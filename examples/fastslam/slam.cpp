@@ -127,9 +127,11 @@ double next_power(const std::vector<Moving>& all, double power, double least) {
 /// up for the ratio (P. Del Moral, A. Doucet, A. Jasra, "Sequential Monte Carlo samplers", JRSS B 68, 2006;
 /// the step of S. Cotter, G. Roberts, A. Stuart, D. White, Statistical Science 28, 2013, whose length does
 /// not depend on how many numbers a path has). O(M frames log landmarks) for each power, and a sparse least
-/// squares. Where sightings have no names, those of one particle stand for all, which is drawn by its weight:
-/// all but the newest have the particles in common anyway, for they have the same ancestors. `optimum` is
-/// where the last one was, and then where this one is.
+/// squares. Where sightings have no names, those of one particle stand for all: all but the newest have the
+/// particles in common anyway, for they have the same ancestors. Of several it is drawn by how likely its
+/// names are when the path that they go with is integrated out, by Laplace's approximation: what a particle's
+/// weight says of its names is blurred by the chance bends of its own path. `optimum` is where the last one
+/// was, and then where this one is.
 class Redrawing {
 public:
   Redrawing(const Belief& belief, const LandmarkLog& log, const SlamOptions& options,
@@ -138,13 +140,14 @@ public:
         options_(options),
         frames_(belief.steps()),
         empty_(log.sensor, options.landmarks),
-        associations_(associations_along(log, path_of_one(belief), empty_)),
-        density_(density_about(belief, optimum)),
-        all_(belief.size()) {}
+        names_(names_of(belief, optimum)),
+        all_(belief.size()) {
+    optimum = names_.density.optimum().poses;
+  }
 
   [[nodiscard]] Belief redrawn() {
     each([&](std::size_t i, cairn::Random& random) {
-      std::vector<double> white(density_.size());
+      std::vector<double> white(names_.density.size());
       for (double& v : white) v = random.normal(0, 1);
       all_[i] = moving(std::move(white));
     });
@@ -163,30 +166,52 @@ public:
   }
 
 private:
-  std::vector<SE2> path_of_one(const Belief& belief) const {
-    cairn::Random choice(~options_.seed, (frames_ << 32U) + belief.size());
-    const std::size_t one =
-        cairn::resampled_indices(belief.particles().weights(), 1, cairn::Resampling::systematic, choice)
-            .front();
-    std::vector<SE2> poses;
-    for (const auto& each : belief.path(one)) poses.push_back(each.pose);
-    poses.erase(poses.begin());  // the start
-    return poses;
+  /// Which landmarks were seen along the log, and the Gaussian about the path that this makes likeliest.
+  struct Names {
+    std::vector<cairn::Association> associations;
+    PathDensity density;
+    double log_evidence;  ///< of the names, the path integrated out
+  };
+  Names named_so(std::vector<cairn::Association> associations, const std::vector<SE2>& start) const {
+    const LandmarkLog part = named(log_, associations);
+    PathDensity density(part, batch_optimum(part, start));
+    const std::vector<SE2>& poses = density.optimum().poses;
+    const double log_evidence =
+        replayed(log_, associations, poses, empty_).log_density - density.log_density(poses);
+    return {std::move(associations), std::move(density), log_evidence};
   }
-  PathDensity density_about(const Belief& belief, std::vector<SE2>& optimum) const {
-    const LandmarkLog part = named(log_, associations_);
+  Names names_of(const Belief& belief, std::vector<SE2> start) const {
+    constexpr std::size_t asked = 16;
     const std::vector<SE2> best = means_of(belief, belief.best());
-    for (std::size_t k = optimum.size(); k < frames_; ++k)
-      optimum.push_back(k == 0 ? best[0] : optimum[k - 1] * best[k - 1].inverse() * best[k]);
-    PathDensity density(part, batch_optimum(part, optimum));
-    optimum = density.optimum().poses;
-    return density;
+    for (std::size_t k = start.size(); k < frames_; ++k)
+      start.push_back(k == 0 ? best[0] : start[k - 1] * best[k - 1].inverse() * best[k]);
+    cairn::Random choice(~options_.seed, (frames_ << 32U) + belief.size());
+    std::vector<std::vector<cairn::Association>> seen;
+    for (const std::size_t i : cairn::resampled_indices(belief.particles().weights(), asked,
+                                                        cairn::Resampling::systematic, choice)) {
+      std::vector<SE2> poses;
+      for (const auto& each : belief.path(i)) poses.push_back(each.pose);
+      poses.erase(poses.begin());  // the start
+      auto associations = associations_along(log_, poses, empty_);
+      if (std::find(seen.begin(), seen.end(), associations) == seen.end())
+        seen.push_back(std::move(associations));
+    }
+    std::vector<std::optional<Names>> all(seen.size());
+    cairn::parallel_for(seen.size(), options_.threads, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) all[i].emplace(named_so(std::move(seen[i]), start));
+    });
+    std::vector<double> log_weights, weights;
+    for (const auto& names : all) log_weights.push_back(names->log_evidence);
+    const double total = cairn::log_sum_exp(log_weights);
+    for (const double w : log_weights) weights.push_back(std::exp(w - total));
+    return std::move(
+        *all[cairn::resampled_indices(weights, 1, cairn::Resampling::systematic, choice).front()]);
   }
 
   Moving moving(std::vector<double> white) const {
-    auto replay =
-        std::make_shared<const Replayed>(replayed(log_, associations_, density_.path(white), empty_));
-    const double log_ratio = replay->log_density - density_.log_density(replay->poses);
+    auto replay = std::make_shared<const Replayed>(
+        replayed(log_, names_.associations, names_.density.path(white), empty_));
+    const double log_ratio = replay->log_density - names_.density.log_density(replay->poses);
     return {std::move(white), std::move(replay), log_ratio};
   }
 
@@ -261,8 +286,7 @@ private:
   const SlamOptions& options_;
   std::uint64_t frames_;
   Map empty_;
-  std::vector<cairn::Association> associations_;
-  PathDensity density_;
+  Names names_;
   std::vector<Moving> all_;
   std::uint64_t rounds_ = 0;
   double length_ = 0.7;  // of a step, of the Gaussian's own spread

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Cholesky>
 #include <doctest/doctest.h>
 
 #include <cairn/core/statistics.hpp>
@@ -108,13 +109,38 @@ TEST_SUITE("fastslam/slam") {
     CAPTURE(seed);
     const LandmarkLog log = simulated(loop_map(), seed, 60);
     const PathDensity density(log, growing_batch_optimum(log));
-    CHECK(density.log_density(density.optimum().poses) == 0);
+    const double highest = density.log_density(density.optimum().poses);
     cairn::Random random(seed);
     constexpr int draws = 200;
     double squared = 0;
-    for (int i = 0; i < draws; ++i) squared -= 2 * density.log_density(density.draw(random)) / draws;
+    for (int i = 0; i < draws; ++i)
+      squared += 2 * (highest - density.log_density(density.draw(random))) / draws;
     // landmarks are drawn with the poses, and integrated out of the density
     CHECK(cairn::chi_square_mean_band(3.0 * 60, draws, 0.999).contains(squared));
+  }
+
+  TEST_CASE("fastslam: the density at the optimum is that of a Gaussian with the covariance of its draws") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    constexpr int frames = 4, draws = 20000;
+    const LandmarkLog log = simulated(loop_map(), seed, frames);
+    const PathDensity density(log, growing_batch_optimum(log));
+    cairn::Random random(seed);
+    Eigen::MatrixXd steps(3 * frames, draws);  // what the motions are off odometry
+    for (int i = 0; i < draws; ++i) {
+      const std::vector<SE2> path = density.draw(random);
+      for (int k = 0; k < frames; ++k) {
+        const auto frame = static_cast<std::size_t>(k);
+        const SE2 before = k == 0 ? SE2() : path[frame - 1];
+        steps.col(i).segment<3>(3 * k) = cairn::local(before * log.frames[frame].moved.mean, path[frame]);
+      }
+    }
+    steps.colwise() -= steps.rowwise().mean().eval();
+    const Eigen::MatrixXd covariance = steps * steps.transpose() / draws;
+    const double log_determinant = covariance.ldlt().vectorD().array().log().sum();
+    // of 12 numbers the logarithm of a sample's determinant is spread by sqrt(2 * 12 / draws)
+    CHECK(2 * density.log_density(density.optimum().poses) ==
+          doctest::Approx(-log_determinant).epsilon(0.25 / std::abs(log_determinant)));
   }
 
   TEST_CASE("fastslam: paths drawn again come nearer to the optimum than those that never go back") {
