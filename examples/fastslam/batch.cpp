@@ -161,51 +161,90 @@ BatchOptimum growing_batch_optimum(const LandmarkLog& log, std::size_t by) {
 
 struct PathDensity::Equations {
   BatchOptimum at;
+  std::vector<SE2> moved;            // odometry
+  std::vector<Vector<3>> residuals;  // of the motions at the optimum
   Eigen::SparseMatrix<double> h;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> root;
+  Eigen::VectorXd sigmas;  // D^-1/2
+
+  /// The optimum's pose k as seen from the one before, inverted, turns a step of that one into a step of k.
+  [[nodiscard]] Matrix<3> carried(std::size_t k) const {
+    return (k == 0 ? at.poses[0].inverse() : SE2(at.poses[k].inverse() * at.poses[k - 1])).adjoint();
+  }
 };
 
 PathDensity::PathDensity(const LandmarkLog& log, BatchOptimum at) {
   auto equations = std::make_unique<Equations>();
   equations->at = std::move(at);
+  for (std::size_t k = 0; k < log.frames.size(); ++k) {
+    const SE2 before = k == 0 ? SE2() : equations->at.poses[k - 1];
+    equations->moved.push_back(log.frames[k].moved.mean);
+    equations->residuals.push_back(cairn::local(before * equations->moved[k], equations->at.poses[k]));
+  }
   equations->h = NormalEquations(log, equations->at).matrix();
   equations->root.compute(equations->h);
   if (equations->root.info() != Eigen::Success || !(equations->root.vectorD().minCoeff() > 0))
     cairn::raise("PathDensity: expected a log that determines every pose");
+  equations->sigmas = equations->root.vectorD().cwiseSqrt().cwiseInverse();
   equations_ = std::move(equations);
 }
+PathDensity::PathDensity(PathDensity&&) noexcept = default;
 PathDensity::~PathDensity() = default;
 
 const BatchOptimum& PathDensity::optimum() const noexcept {
   return equations_->at;
 }
 
-// H = P^T L D L^T P: d = P^T L^-T D^-1/2 z has the covariance H^-1.
-std::vector<SE2> PathDensity::draw(cairn::Random& random) const {
-  const auto& root = equations_->root;
-  Eigen::VectorXd z(root.vectorD().size());
-  for (int i = 0; i < z.size(); ++i) z(i) = random.normal(0, 1) / std::sqrt(root.vectorD()(i));
+std::size_t PathDensity::size() const noexcept {
+  return static_cast<std::size_t>(equations_->h.rows());
+}
+
+// H = P^T L D L^T P: d = P^T L^-T D^-1/2 z has the covariance H^-1. What d says of each motion's residual is
+// taken as the residual, and the motions are made one after the other.
+std::vector<SE2> PathDensity::path(const std::vector<double>& white) const {
+  CAIRN_EXPECTS(white.size() == size(), "path needs as many numbers as size() says");
+  const auto& [at, moved, residuals, h, root, sigmas] = *equations_;
+  Eigen::VectorXd z = sigmas;
+  for (int i = 0; i < z.size(); ++i) z(i) *= white[static_cast<std::size_t>(i)];
   const Eigen::VectorXd d = root.permutationPinv() * Eigen::VectorXd(root.matrixU().solve(z));
-  std::vector<SE2> poses = equations_->at.poses;
-  for (std::size_t k = 0; k < poses.size(); ++k)
-    poses[k] = cairn::retract(poses[k], Vector<3>(d.segment<3>(3 * static_cast<int>(k))));
+  std::vector<SE2> poses;
+  Vector<3> before = Vector<3>::Zero();
+  for (std::size_t k = 0; k < at.poses.size(); ++k) {
+    const Vector<3> step = d.segment<3>(3 * static_cast<int>(k));
+    const Vector<3> residual = residuals[k] + step - equations_->carried(k) * before;
+    poses.push_back(cairn::retract((k == 0 ? SE2() : poses.back()) * moved[k], residual));
+    before = step;
+  }
   return poses;
+}
+
+std::vector<SE2> PathDensity::draw(cairn::Random& random) const {
+  std::vector<double> white(size());
+  for (double& v : white) v = random.normal(0, 1);
+  return path(white);
 }
 
 // The marginal's information is H_xx - H_xm H_mm^-1 H_mx, and landmarks do not meet each other in H.
 double PathDensity::log_density(const std::vector<SE2>& poses) const {
-  const auto& [at, h, root] = *equations_;
+  const auto& [at, moved, residuals, h, root, sigmas] = *equations_;
   Eigen::VectorXd e = Eigen::VectorXd::Zero(h.rows());
-  for (std::size_t k = 0; k < poses.size(); ++k)
-    e.segment<3>(3 * static_cast<int>(k)) = cairn::local(at.poses[k], poses[k]);
+  Vector<3> step = Vector<3>::Zero();
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    const Vector<3> residual = cairn::local((k == 0 ? SE2() : poses[k - 1]) * moved[k], poses[k]);
+    step = residual - residuals[k] + equations_->carried(k) * step;
+    e.segment<3>(3 * static_cast<int>(k)) = step;
+  }
   const Eigen::VectorXd v = h.selfadjointView<Eigen::Lower>() * e;
   double squared = e.dot(v);
+  double log_determinant = root.vectorD().array().log().sum();  // of the poses' share of h, in the end
   for (int row = 3 * static_cast<int>(poses.size()); row < h.rows(); row += 2) {
     Matrix<2> block;
     block << h.coeff(row, row), h.coeff(row + 1, row), h.coeff(row + 1, row), h.coeff(row + 1, row + 1);
-    squared -= cairn::Cholesky<2>(block).whiten(Vector<2>(v.segment<2>(row))).squaredNorm();
+    const cairn::Cholesky<2> landmark(block);
+    squared -= landmark.whiten(Vector<2>(v.segment<2>(row))).squaredNorm();
+    log_determinant -= landmark.log_determinant();
   }
-  return -0.5 * squared;
+  return 0.5 * (log_determinant - squared);
 }
 
 }  // namespace fastslam

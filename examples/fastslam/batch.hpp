@@ -38,16 +38,23 @@ struct BatchOptimum {
 [[nodiscard]] BatchOptimum growing_batch_optimum(const LandmarkLog& log, std::size_t by = 50);
 
 /// The Gaussian about a batch optimum that has its curvature (Laplace's approximation), of the poses alone:
-/// landmarks are integrated out.
+/// landmarks are integrated out. It is Gaussian in what the motions are off odometry, step by step, and a
+/// path is made of its steps: wheels slip by millimetres where a place is known to decimetres, and a Gaussian
+/// of the places bends every step by more than that, to the second order of turns and places.
 class PathDensity {
 public:
   /// Throws cairn::Error where the optimum's equations are singular.
   PathDensity(const LandmarkLog& log, BatchOptimum at);
+  PathDensity(PathDensity&&) noexcept;
   ~PathDensity();
 
   [[nodiscard]] const BatchOptimum& optimum() const noexcept;
+  /// How many numbers a path is made of: those of poses and landmarks.
+  [[nodiscard]] std::size_t size() const noexcept;
+  /// The path of so many numbers, which are independent and standard normal where it is a draw.
+  [[nodiscard]] std::vector<cairn::SE2> path(const std::vector<double>& white) const;
   [[nodiscard]] std::vector<cairn::SE2> draw(cairn::Random& random) const;
-  /// But for a constant.
+  /// But for the power of 2 pi, which all paths of as many poses share, whatever was seen.
   [[nodiscard]] double log_density(const std::vector<cairn::SE2>& poses) const;
 
 private:

@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <memory>
 #include <numeric>
 #include <utility>
 
@@ -72,76 +73,224 @@ LandmarkLog named(const LandmarkLog& log, const std::vector<cairn::Association>&
 
 /// What the particles' own model says of a path: its map, and log p(x_1:t, n_1:t, z_1:t).
 struct Replayed {
-  std::vector<cairn::PathPose<SE2>> path;
+  std::vector<SE2> poses;
   Map map;
   double log_density = 0;
 };
 Replayed replayed(const LandmarkLog& log, const std::vector<cairn::Association>& associations,
-                  const std::vector<SE2>& poses, Map map) {
-  Replayed r{{}, std::move(map)};
-  const cairn::Gaussian<SE2> start{SE2(), cairn::Matrix<3>::Zero()};
-  r.path.push_back({start.mean, start, start.mean, start.mean, 0});
-  for (std::size_t k = 0; k < poses.size(); ++k) {
+                  std::vector<SE2> poses, Map map) {
+  Replayed r{std::move(poses), std::move(map)};
+  SE2 before;
+  for (std::size_t k = 0; k < r.poses.size(); ++k) {
     const Frame& frame = log.frames[k];
-    const SE2 before = r.path.back().pose;
     const cairn::Gaussian<SE2> motion{before * frame.moved.mean, frame.moved.covariance};
+    before = r.poses[k];
     r.log_density +=
-        cairn::log_density(motion, poses[k]) + r.map.log_likelihood(poses[k], frame.seen, associations[k]);
-    r.map.insert(poses[k], frame.seen, associations[k]);
-    r.path.push_back({poses[k], {poses[k], cairn::Matrix<3>::Zero()}, before, poses[k], k + 1});
+        cairn::log_density(motion, before) + r.map.log_likelihood(before, frame.seen, associations[k]);
+    r.map.insert(before, frame.seen, associations[k]);
   }
   return r;
 }
 
-/// All paths drawn again: from the Gaussian about the optimum of the log so far, weighed by what the
-/// particles' own model says of them over that density. Importance sampling of the same distribution as the
-/// filter's, which never goes back: with that alone a bend between two visits stays, and where no particle
-/// came back right, none ever will. O(M frames log landmarks), and a sparse least squares.
-/// Where sightings have no names, those of one particle stand for all, which is drawn by its weight: all but
-/// the newest have the particles in common anyway, for they have the same ancestors. `optimum` is where the
-/// last one was, and then where this one is.
-Belief redrawn(const Belief& belief, const LandmarkLog& log, const SlamOptions& options,
-               std::vector<SE2>& optimum) {
-  const std::size_t frames = belief.steps();
-  const Map empty(log.sensor, options.landmarks);
-  cairn::Random choice(~options.seed, (frames << 32U) + belief.size());
-  const std::size_t one =
-      cairn::resampled_indices(belief.particles().weights(), 1, cairn::Resampling::systematic, choice)
-          .front();
-  std::vector<SE2> poses_of_one;
-  for (const auto& each : belief.path(one)) poses_of_one.push_back(each.pose);
-  poses_of_one.erase(poses_of_one.begin());  // the start
-  const auto associations = associations_along(log, poses_of_one, empty);
-  const LandmarkLog part = named(log, associations);
-  const std::vector<SE2> best = means_of(belief, belief.best());
-  for (std::size_t k = optimum.size(); k < frames; ++k)
-    optimum.push_back(k == 0 ? best[0] : optimum[k - 1] * best[k - 1].inverse() * best[k]);
-  const PathDensity density(part, batch_optimum(part, optimum));
-  optimum = density.optimum().poses;
-  std::vector<std::optional<Replayed>> drawn(belief.size());
-  std::vector<double> log_weights(belief.size());
-  cairn::parallel_for(belief.size(), options.threads, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      cairn::Random random(~options.seed, (frames << 32U) + i);  // not the filter's
-      const std::vector<SE2> poses = density.draw(random);
-      drawn[i] = replayed(log, associations, poses, empty);
-      log_weights[i] = drawn[i]->log_density - density.log_density(poses);
+/// A path that is being moved: the numbers that PathDensity makes it of, and how it is weighed.
+struct Moving {
+  std::vector<double> white;
+  std::shared_ptr<const Replayed> replayed;
+  double log_ratio = 0;  ///< of the particles' own model over the Gaussian that the path was drawn from
+};
+
+/// How far a power of the ratios may go on from here with `least` of them left as an effective number.
+double next_power(const std::vector<Moving>& all, double power, double least) {
+  const auto effective_size = [&](double next) {
+    std::vector<double> log_weights, twice;
+    for (const Moving& m : all) {
+      log_weights.push_back((next - power) * m.log_ratio);
+      twice.push_back(2 * log_weights.back());
     }
-  });
-  const double total = cairn::log_sum_exp(log_weights);
-  cairn::PathsRecord<SE2> record{.nodes = {}, .particles = {}, .step = frames};
-  std::vector<Map> maps;
-  for (std::size_t i = 0; i < belief.size(); ++i) {
-    std::uint32_t parent = 0xffffffffU;
-    for (const auto& pose : drawn[i]->path) {
-      record.nodes.push_back({pose, parent});
-      parent = static_cast<std::uint32_t>(record.nodes.size() - 1);
-    }
-    record.particles.push_back({parent, log_weights[i] - total, log_weights[i] - total, 0});
-    maps.push_back(std::move(drawn[i]->map));
+    return std::exp(2 * cairn::log_sum_exp(log_weights) - cairn::log_sum_exp(twice));
+  };
+  if (effective_size(1) >= least) return 1;
+  double low = power, high = 1;
+  for (int i = 0; i < 40; ++i) {
+    const double middle = 0.5 * (low + high);
+    (effective_size(middle) >= least ? low : high) = middle;
   }
-  return {record, std::move(maps)};
+  return low;
 }
+
+/// All paths drawn again: from the Gaussian about the optimum of the log so far, and led from there to what
+/// the particles' own model says of them, which is the filter's distribution. The filter never goes back:
+/// with that alone a bend between two visits stays, and where no particle came back right, none ever will.
+/// Weights of the model over the Gaussian alone would leave few paths of thousands of poses. So the ratio's
+/// power grows from 0 to 1 by as much as leaves half of the paths as an effective number, they are resampled,
+/// and each is moved by steps that keep the Gaussian as it is and are taken with the probability that makes
+/// up for the ratio (P. Del Moral, A. Doucet, A. Jasra, "Sequential Monte Carlo samplers", JRSS B 68, 2006;
+/// the step of S. Cotter, G. Roberts, A. Stuart, D. White, Statistical Science 28, 2013, whose length does
+/// not depend on how many numbers a path has). O(M frames log landmarks) for each power, and a sparse least
+/// squares. Where sightings have no names, those of one particle stand for all: all but the newest have the
+/// particles in common anyway, for they have the same ancestors. Of several it is drawn by how likely its
+/// names are when the path that they go with is integrated out, by Laplace's approximation: what a particle's
+/// weight says of its names is blurred by the chance bends of its own path. `optimum` is where the last one
+/// was, and then where this one is.
+class Redrawing {
+public:
+  Redrawing(const Belief& belief, const LandmarkLog& log, const SlamOptions& options,
+            std::vector<SE2>& optimum)
+      : log_(log),
+        options_(options),
+        frames_(belief.steps()),
+        empty_(log.sensor, options.landmarks),
+        names_(names_of(belief, optimum)),
+        all_(belief.size()) {
+    optimum = names_.density.optimum().poses;
+  }
+
+  [[nodiscard]] Belief redrawn() {
+    each([&](std::size_t i, cairn::Random& random) {
+      std::vector<double> white(names_.density.size());
+      for (double& v : white) v = random.normal(0, 1);
+      all_[i] = moving(std::move(white));
+    });
+    constexpr int most_powers = 400;
+    double power = 0;
+    for (int powers = 1;; ++powers) {
+      const double next =
+          powers < most_powers ? next_power(all_, power, 0.5 * static_cast<double>(all_.size())) : 1;
+      std::vector<double> log_weights;
+      for (const Moving& m : all_) log_weights.push_back((next - power) * m.log_ratio);
+      power = next;
+      if (power == 1) return belief_of(log_weights);
+      resample(log_weights);
+      move(power);
+    }
+  }
+
+private:
+  /// Which landmarks were seen along the log, and the Gaussian about the path that this makes likeliest.
+  struct Names {
+    std::vector<cairn::Association> associations;
+    PathDensity density;
+    double log_evidence;  ///< of the names, the path integrated out
+  };
+  Names named_so(std::vector<cairn::Association> associations, const std::vector<SE2>& start) const {
+    const LandmarkLog part = named(log_, associations);
+    PathDensity density(part, batch_optimum(part, start));
+    const std::vector<SE2>& poses = density.optimum().poses;
+    const double log_evidence =
+        replayed(log_, associations, poses, empty_).log_density - density.log_density(poses);
+    return {std::move(associations), std::move(density), log_evidence};
+  }
+  Names names_of(const Belief& belief, std::vector<SE2> start) const {
+    constexpr std::size_t asked = 16;
+    const std::vector<SE2> best = means_of(belief, belief.best());
+    for (std::size_t k = start.size(); k < frames_; ++k)
+      start.push_back(k == 0 ? best[0] : start[k - 1] * best[k - 1].inverse() * best[k]);
+    cairn::Random choice(~options_.seed, (frames_ << 32U) + belief.size());
+    std::vector<std::vector<cairn::Association>> seen;
+    for (const std::size_t i : cairn::resampled_indices(belief.particles().weights(), asked,
+                                                        cairn::Resampling::systematic, choice)) {
+      std::vector<SE2> poses;
+      for (const auto& each : belief.path(i)) poses.push_back(each.pose);
+      poses.erase(poses.begin());  // the start
+      auto associations = associations_along(log_, poses, empty_);
+      if (std::find(seen.begin(), seen.end(), associations) == seen.end())
+        seen.push_back(std::move(associations));
+    }
+    std::vector<std::optional<Names>> all(seen.size());
+    cairn::parallel_for(seen.size(), options_.threads, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) all[i].emplace(named_so(std::move(seen[i]), start));
+    });
+    std::vector<double> log_weights, weights;
+    for (const auto& names : all) log_weights.push_back(names->log_evidence);
+    const double total = cairn::log_sum_exp(log_weights);
+    for (const double w : log_weights) weights.push_back(std::exp(w - total));
+    return std::move(
+        *all[cairn::resampled_indices(weights, 1, cairn::Resampling::systematic, choice).front()]);
+  }
+
+  Moving moving(std::vector<double> white) const {
+    auto replay = std::make_shared<const Replayed>(
+        replayed(log_, names_.associations, names_.density.path(white), empty_));
+    const double log_ratio = replay->log_density - names_.density.log_density(replay->poses);
+    return {std::move(white), std::move(replay), log_ratio};
+  }
+
+  /// Calls visit(i, random) for all; none of these numbers are the filter's.
+  template <class Visit>
+  void each(const Visit& visit) {
+    const std::uint64_t first = (frames_ << 32U) + ++rounds_ * (all_.size() + 1);
+    cairn::parallel_for(all_.size(), options_.threads, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        cairn::Random random(~options_.seed, first + i);
+        visit(i, random);
+      }
+    });
+  }
+
+  void resample(const std::vector<double>& log_weights) {
+    const double total = cairn::log_sum_exp(log_weights);
+    std::vector<double> weights;
+    for (const double w : log_weights) weights.push_back(std::exp(w - total));
+    cairn::Random random(~options_.seed, (frames_ << 32U) + ++rounds_ * (all_.size() + 1));
+    std::vector<Moving> next;
+    for (const std::size_t i :
+         cairn::resampled_indices(weights, all_.size(), cairn::Resampling::systematic, random))
+      next.push_back(all_[i]);
+    all_ = std::move(next);
+  }
+
+  /// Moves until the steps that were taken are half of one that forgets, as a variance.
+  void move(double power) {
+    constexpr int most_sweeps = 3;
+    double gone = 0;
+    for (int sweep = 0; sweep < most_sweeps && gone < 0.5; ++sweep) {
+      std::vector<char> taken(all_.size(), 0);
+      each([&](std::size_t i, cairn::Random& random) {
+        std::vector<double> white = all_[i].white;
+        const double kept = std::sqrt(1 - length_ * length_);
+        for (double& v : white) v = kept * v + random.normal(0, length_);
+        Moving other = moving(std::move(white));
+        if (std::log(random.uniform()) >= power * (other.log_ratio - all_[i].log_ratio)) return;
+        all_[i] = std::move(other);
+        taken[i] = 1;
+      });
+      const double share =
+          static_cast<double>(std::count(taken.begin(), taken.end(), 1)) / static_cast<double>(taken.size());
+      gone += share * length_ * length_;
+      length_ = std::clamp(length_ * std::exp(share - 0.4), 0.05, 1.0);
+    }
+  }
+
+  Belief belief_of(const std::vector<double>& log_weights) const {
+    const double total = cairn::log_sum_exp(log_weights);
+    cairn::PathsRecord<SE2> record{.nodes = {}, .particles = {}, .step = frames_};
+    std::vector<Map> maps;
+    for (std::size_t i = 0; i < all_.size(); ++i) {
+      std::uint32_t parent = 0xffffffffU;
+      SE2 before;
+      const auto add = [&](const SE2& pose, std::uint64_t step) {
+        record.nodes.push_back({{pose, {pose, cairn::Matrix<3>::Zero()}, before, pose, step}, parent});
+        parent = static_cast<std::uint32_t>(record.nodes.size() - 1);
+        before = pose;
+      };
+      add(SE2(), 0);
+      for (std::size_t k = 0; k < frames_; ++k) add(all_[i].replayed->poses[k], k + 1);
+      const double log_weight = log_weights[i] - total;
+      record.particles.push_back({parent, log_weight, log_weight, 0});
+      maps.push_back(all_[i].replayed->map);
+    }
+    return {record, std::move(maps)};
+  }
+
+  const LandmarkLog& log_;
+  const SlamOptions& options_;
+  std::uint64_t frames_;
+  Map empty_;
+  Names names_;
+  std::vector<Moving> all_;
+  std::uint64_t rounds_ = 0;
+  double length_ = 0.7;  // of a step, of the Gaussian's own spread
+};
 
 /// Weighted mean of all particles' paths, pose by pose.
 std::vector<SE2> mean_path(const Belief& belief) {
@@ -325,8 +474,9 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
     if (!did.accepted())
       cairn::raise("frame " + std::to_string(odometry.size()) + ": " + explain(did.status));
     std::optional<double> redrawn_size;
-    if (redraws && belief.steps() == next_redraw) {
-      belief = redrawn(belief, log, options, optimum);
+    const bool is_last = belief.steps() == log.frames.size();  // the path and map that are handed over
+    if (redraws && (belief.steps() == next_redraw || is_last)) {
+      belief = Redrawing(belief, log, options, optimum).redrawn();
       redrawn_size = belief.particles().effective_size();
       next_redraw += std::max<std::size_t>(options.redraw_every, next_redraw / 8);
     }

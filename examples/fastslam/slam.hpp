@@ -33,11 +33,11 @@ struct SlamOptions {
   unsigned threads = 1;
   ProposalKind proposal = ProposalKind::landmarks;
   double resample_below = 0.5;
-  /// With FastSLAM 2.0: all paths are drawn again from the Gaussian about the least squares of the log so
-  /// far, and weighed; without names, under the associations of one particle. Every so many frames and an
-  /// eighth of those before, whichever is more, so that a log costs O(its length). 0: never, which is
-  /// FastSLAM as published.
-  std::size_t redraw_every = 250;
+  /// With FastSLAM 2.0: all paths are drawn again from the distribution that the filter is of, and without
+  /// names under the associations of one particle. Every so many frames and an eighth of those before,
+  /// whichever is more, so that a log costs O(its length) times its logarithm, and at the log's end. 0:
+  /// never, which is FastSLAM as published.
+  std::size_t redraw_every = 100;
   cairn::LandmarkOptions landmarks{.pick = cairn::Pick::drawn, .gate = 0.999};
 };
 

@@ -208,20 +208,32 @@ std::uint8_t Campus::grey_of(std::uint32_t number, const Block::Entry& entry, co
 cairn::Image Campus::picture(const cairn::LineCamera& camera, const SE3& rig) const {
   cairn::Image image(camera.camera().width(), camera.camera().height());
   const Vector<3> from = rig * camera.centre();
+  // A ray enters a ball that it does not begin in where it is within the ball's cone.
+  std::vector<Vector<3>> towards;
+  std::vector<double> cosines;
+  for (const Block& block : blocks_) {
+    const Vector<3> way = block.centre - from;
+    const double away = way.norm(), sine = block.radius / away;
+    towards.push_back(way / away);
+    cosines.push_back(sine < 1 ? std::sqrt(1 - sine * sine) - 1e-9 : -1.0);
+  }
   for (int y = 0; y < image.height(); ++y)
     for (int x = 0; x < image.width(); ++x) {
       const Vector<3> ray = rig.rotation().rotate(camera.ray({x, y}));
+      const double length = ray.norm();
       double nearest = std::numeric_limits<double>::infinity();
       std::uint8_t grey = 245;  // sky
       if (ray(2) < 0) {
         nearest = -from(2) / ray(2);
         grey = 90;
       }
-      for (std::uint32_t b = 0; b < blocks_.size(); ++b)
-        if (const auto entry = blocks_[b].entry(from, ray); entry && entry->t < nearest) {
-          nearest = entry->t;
-          grey = grey_of(b, *entry, from + entry->t * ray);
-        }
+      for (std::uint32_t b = 0; b < blocks_.size(); ++b) {
+        if (ray.dot(towards[b]) < cosines[b] * length) continue;
+        const auto entry = blocks_[b].entry(from, ray);
+        if (!entry || entry->t >= nearest) continue;
+        nearest = entry->t;
+        grey = grey_of(b, *entry, from + entry->t * ray);
+      }
       image(x, y) = grey;
     }
   return image;

@@ -45,7 +45,9 @@ Drive simulated_drive(const DriveOptions& o) {
       } else {
         frame.moved = {SE3(), 1e-12 * cairn::Matrix<6>::Identity()};
       }
-      frame.detections = detect(drive.campus, drive.rig, drive.truth[k], o.detector, random);
+      frame.detections = o.detector_kind == DetectorKind::lsd
+                             ? detect_in_pictures(drive.campus, drive.rig, drive.truth[k], o.detector)
+                             : detect(drive.campus, drive.rig, drive.truth[k], o.detector, random);
       for (LineSighting& sighting : match(drive.rig, frame.detections, o.matching))
         frame.seen.push_back({std::move(sighting), {}});
     }

@@ -25,6 +25,7 @@ struct DriveOptions {
   // Odometry errs by these, independently from step to step: a share of the way and an angle a metre.
   double slip = 0.03;
   double turn = 0.0175, tilt = 0.0035;  ///< [rad/m] about the vertical, about the others
+  DetectorKind detector_kind = DetectorKind::noise;
   DetectorOptions detector{};
   MatchingOptions matching{};
 };

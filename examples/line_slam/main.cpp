@@ -16,9 +16,12 @@
 
 #include <CLI/CLI.hpp>
 
+#include <cairn/core/check.hpp>
+
 #include "drive.hpp"
 #include "outputs.hpp"
 #include "run.hpp"
+#include "segment_detector.hpp"
 #include "support/command_line.hpp"
 #include "support/interruption.hpp"
 #include "support/progress.hpp"
@@ -61,6 +64,10 @@ int main(int argc, char** argv) {
   bool quiet = false;
   CLI::App app{
       "Maps straight edges that three cameras see: particles over a drive around a rendered campus."};
+  std::string detector = "noise";
+  app.add_option("--detector", detector,
+                 "noise: the edges in view, with errors; lsd: what OpenCV's detector finds in the pictures")
+      ->check(CLI::IsMember({"noise", "lsd"}));
   app.add_option("--metres", drive_options.metres, "of the drive; once around is 230")
       ->check(example::number_between(1, 10000));
   app.add_option("--out", out, "folder for the trajectory, the lines, the summary and the report");
@@ -73,6 +80,11 @@ int main(int argc, char** argv) {
   app.add_option("--threads", options.threads, "threads")->check(example::whole_number(1, 1024));
   if (const std::optional<int> code = example::parse(app, name, argc, argv)) return *code;
   return example::exit_code_of(name, [&]() -> int {
+    if (detector == "lsd") {
+      if (!has_segment_detector())
+        cairn::raise("--detector lsd: expected OpenCV, and this program was built without (libopencv-dev)");
+      drive_options.detector_kind = DetectorKind::lsd;
+    }
     prepare_folder(out);
     const example::Interruption interruption;
     drive_options.seed = options.seed;

@@ -11,6 +11,8 @@
 
 #include <cairn/core/statistics.hpp>
 
+#include "segment_detector.hpp"
+
 namespace line_slam {
 
 namespace {
@@ -134,6 +136,29 @@ private:
   std::vector<Detected> found_;
 };
 
+/// The edge that a segment lies along: both ends within two pixels of its line, beside most of it; of several
+/// the nearest.
+std::uint32_t edge_along(const LineSegment& segment, const std::vector<Detected>& edges) {
+  double nearest = 2;  // [pixels]
+  std::uint32_t edge = no_edge;
+  for (const Detected& e : edges) {
+    const Vector<2> along = (e.segment.to - e.segment.from).normalized();
+    const double length = e.segment.length();
+    double off = 0, low = length, high = 0;
+    for (const Vector<2>* end : {&segment.from, &segment.to}) {
+      const Vector<2> d = *end - e.segment.from;
+      off = std::max(off, std::abs(d(1) * along(0) - d(0) * along(1)));
+      low = std::min(low, d.dot(along));
+      high = std::max(high, d.dot(along));
+    }
+    const double beside = std::min(high, length) - std::max(low, 0.0);
+    if (off >= nearest || beside < 0.5 * segment.length()) continue;
+    nearest = off;
+    edge = e.edge;
+  }
+  return edge;
+}
+
 /// The nearer end of `of` is so far from `segment` along it; nothing where it lies beside it, or turned.
 std::optional<double> gap_between(const LineSegment& segment, const LineSegment& of, double sigma) {
   const Vector<2> along = (segment.to - segment.from).normalized();
@@ -230,6 +255,26 @@ Detections detect(const Campus& campus, const Rig& rig, const SE3& pose, const D
   Detections all;
   for (std::size_t c = 0; c < cameras; ++c)
     all[c] = joined(Detector(campus, rig[c], pose, options, random).all(), options.sigma);
+  return all;
+}
+
+Detections detect_in_pictures(const Campus& campus, const Rig& rig, const SE3& pose,
+                              const DetectorOptions& options) {
+  const DetectorOptions exactly{.sigma = 0,
+                                .shortest = 0.5 * options.shortest,
+                                .farthest = options.farthest,
+                                .missed = 0,
+                                .made_up = 0,
+                                .broken = 0};
+  Detections all;
+  cairn::Random nothing(1);
+  for (std::size_t c = 0; c < cameras; ++c) {
+    const std::vector<Detected> edges = Detector(campus, rig[c], pose, exactly, nothing).all();
+    std::vector<Detected> found;
+    for (const LineSegment& s : segments_of(campus.picture(rig[c], pose), options.shortest))
+      found.push_back({s, edge_along(s, edges)});
+    all[c] = joined(std::move(found), options.sigma);
+  }
   return all;
 }
 

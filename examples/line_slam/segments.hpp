@@ -45,9 +45,20 @@ struct DetectorOptions {
   double widest_gap = 6;  ///< between the pieces
 };
 
+enum class DetectorKind {
+  noise,  ///< the edges in view, with the errors that DetectorOptions say
+  lsd     ///< what OpenCV's detector finds in the rendered pictures
+};
+
 /// The edges in view: clipped by the picture, hidden parts left out, broken, missed, and some made up.
 [[nodiscard]] Detections detect(const Campus& campus, const Rig& rig, const cairn::SE3& pose,
                                 const DetectorOptions& options, cairn::Random& random);
+
+/// What the detector finds in the three pictures that are rendered from here. A segment is of the edge in
+/// view that it lies along, to two pixels: to judge the result only. Throws cairn::Error where there is no
+/// detector.
+[[nodiscard]] Detections detect_in_pictures(const Campus& campus, const Rig& rig, const cairn::SE3& pose,
+                                            const DetectorOptions& options);
 
 /// A line that all three cameras saw.
 struct LineSighting {

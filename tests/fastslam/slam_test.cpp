@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include <Eigen/Cholesky>
 #include <doctest/doctest.h>
 
 #include <cairn/core/statistics.hpp>
@@ -108,13 +109,38 @@ TEST_SUITE("fastslam/slam") {
     CAPTURE(seed);
     const LandmarkLog log = simulated(loop_map(), seed, 60);
     const PathDensity density(log, growing_batch_optimum(log));
-    CHECK(density.log_density(density.optimum().poses) == 0);
+    const double highest = density.log_density(density.optimum().poses);
     cairn::Random random(seed);
     constexpr int draws = 200;
     double squared = 0;
-    for (int i = 0; i < draws; ++i) squared -= 2 * density.log_density(density.draw(random)) / draws;
+    for (int i = 0; i < draws; ++i)
+      squared += 2 * (highest - density.log_density(density.draw(random))) / draws;
     // landmarks are drawn with the poses, and integrated out of the density
     CHECK(cairn::chi_square_mean_band(3.0 * 60, draws, 0.999).contains(squared));
+  }
+
+  TEST_CASE("fastslam: the density at the optimum is that of a Gaussian with the covariance of its draws") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    constexpr int frames = 4, draws = 20000;
+    const LandmarkLog log = simulated(loop_map(), seed, frames);
+    const PathDensity density(log, growing_batch_optimum(log));
+    cairn::Random random(seed);
+    Eigen::MatrixXd steps(3 * frames, draws);  // what the motions are off odometry
+    for (int i = 0; i < draws; ++i) {
+      const std::vector<SE2> path = density.draw(random);
+      for (int k = 0; k < frames; ++k) {
+        const auto frame = static_cast<std::size_t>(k);
+        const SE2 before = k == 0 ? SE2() : path[frame - 1];
+        steps.col(i).segment<3>(3 * k) = cairn::local(before * log.frames[frame].moved.mean, path[frame]);
+      }
+    }
+    steps.colwise() -= steps.rowwise().mean().eval();
+    const Eigen::MatrixXd covariance = steps * steps.transpose() / draws;
+    const double log_determinant = covariance.ldlt().vectorD().array().log().sum();
+    // of 12 numbers the logarithm of a sample's determinant is spread by sqrt(2 * 12 / draws)
+    CHECK(2 * density.log_density(density.optimum().poses) ==
+          doctest::Approx(-log_determinant).epsilon(0.25 / std::abs(log_determinant)));
   }
 
   TEST_CASE("fastslam: paths drawn again come nearer to the optimum than those that never go back") {
@@ -135,6 +161,46 @@ TEST_SUITE("fastslam/slam") {
     MESSAGE("sums of squares ", drawn_again, ", ", never, "; NEES ", nees.mean());
     CHECK(drawn_again < 0.5 * never);
     CHECK(cairn::chi_square_mean_band(3, 5, 0.999).contains(nees.mean()));
+  }
+
+  TEST_CASE("fastslam: millimetres of slip bend no path that is drawn about places known to decimetres") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    LandmarkLog log = simulated(loop_map(), seed, 400);
+    for (Frame& frame : log.frames) frame.moved.covariance(1, 1) = std::pow(1e-3, 2);
+    const PathDensity density(log, growing_batch_optimum(log));
+    cairn::Random random(seed);
+    double across = 0;  // of the motions' residuals
+    constexpr int draws = 10;
+    for (int i = 0; i < draws; ++i) {
+      const std::vector<SE2> path = density.draw(random);
+      for (std::size_t k = 1; k < path.size(); ++k)
+        across += std::pow(cairn::local(path[k - 1] * log.frames[k].moved.mean, path[k])(1), 2);
+    }
+    across = std::sqrt(across / (draws * static_cast<double>(log.frames.size())));
+    MESSAGE("across ", across, " m");
+    CHECK(across < 1.5e-3);
+  }
+
+  TEST_CASE("fastslam: paths drawn again leave most of their weights, and a spread that the truth is in") {
+    constexpr std::uint64_t runs = 8;
+    cairn::RunningMoments nees;
+    for (std::uint64_t seed = 1; seed <= runs; ++seed) {
+      const LandmarkLog log = simulated(loop_map(), seed, 300);
+      const Results r = run(log, {.particles = 60, .seed = seed, .redraw_every = 25});
+      std::size_t redrawn = 0;
+      for (const StepRecord& step : r.steps) {
+        if (!step.redrawn) continue;
+        ++redrawn;
+        CHECK(*step.redrawn >= 0.5 * 60 - 1e-9);
+        nees.add(*step.nees);
+      }
+      CHECK(redrawn >= 11);
+      CHECK(r.steps.back().redrawn.has_value());
+    }
+    MESSAGE("NEES ", nees.mean());
+    CHECK(nees.mean() > 2);
+    CHECK(nees.mean() < 4.5);
   }
 
   TEST_CASE("fastslam: with the start known NEES is about its number of dimensions, for both filters") {

@@ -42,9 +42,10 @@ TEST_SUITE("line_slam/program") {
   TEST_CASE("line_slam: a mistake is exit code 2 and a line") {
     const cairn_test::Folder folder;
     const std::string out = " --out \"" + (folder / "out").string() + "\"";
-    cairn_test::check_mistakes([&](const std::string& mistake) { return run(mistake + out); },
-                               {"--nonsense", "--particles 0", "--particles many", "--threads 0", "--seed -1",
-                                "--metres 0", "--metres nan", "--quiet=perhaps", "more words"});
+    cairn_test::check_mistakes(
+        [&](const std::string& mistake) { return run(mistake + out); },
+        {"--nonsense", "--particles 0", "--particles many", "--threads 0", "--seed -1", "--metres 0",
+         "--metres nan", "--detector eyes", "--quiet=perhaps", "more words"});
     CHECK_FALSE(fs::exists(folder / "out"));
     folder.put("file", "");
     CHECK(run("--out \"" + (folder / "file").string() + "\"").code == 2);
@@ -73,6 +74,23 @@ TEST_SUITE("line_slam/program") {
     CHECK(cairn::read_tum(folder / "1" / "trajectory.txt").size() == 21);
     const std::string lines = cairn::read_file(folder / "1" / "lines.csv");
     CHECK(std::count(lines.begin(), lines.end(), '\n') == 1 + summary["slam"]["lines"].get<int>());
+  }
+
+  TEST_CASE("line_slam: segments found in the pictures make a map, or it is said that there is no detector") {
+    const cairn_test::Folder folder;
+    const Outcome outcome = run("--detector lsd --particles 20 --metres 12 --seed 5 --quiet --out \"" +
+                                (folder / "out").string() + "\"");
+    CAPTURE(outcome.words);
+    if (outcome.says("expected OpenCV")) {
+      CHECK(outcome.code == 2);
+      CHECK_FALSE(fs::exists(folder / "out"));
+      MESSAGE("skipped: OpenCV's line segment detector, without OpenCV");
+      return;
+    }
+    REQUIRE(outcome.code == 0);
+    const auto summary = nlohmann::json::parse(cairn::read_file(folder / "out" / "summary.json"));
+    CHECK(summary["slam"]["lines"].get<int>() >= 20);
+    CHECK(summary["slam"]["rms_m"].get<double>() < 0.3);
   }
 
   TEST_CASE("line_slam: interrupted, it writes the frames until then") {
