@@ -165,8 +165,18 @@ struct PathDensity::Equations {
   std::vector<Vector<3>> residuals;  // of the motions at the optimum
   Eigen::SparseMatrix<double> h;
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> root;
-  Eigen::VectorXd sigmas;  // D^-1/2
+  Eigen::VectorXd sigmas;      // D^-1/2
+  double log_determinant = 0;  // of the poses' marginal information
 
+  /// What landmarks have of H stands below the poses' rows, two by two.
+  template <class Visit>
+  void for_each_landmark(const Visit& visit) const {
+    for (int row = 3 * static_cast<int>(at.poses.size()); row < h.rows(); row += 2) {
+      Matrix<2> block;
+      block << h.coeff(row, row), h.coeff(row + 1, row), h.coeff(row + 1, row), h.coeff(row + 1, row + 1);
+      visit(row, cairn::Cholesky<2>(block));
+    }
+  }
   /// The optimum's pose k as seen from the one before, inverted, turns a step of that one into a step of k.
   [[nodiscard]] Matrix<3> carried(std::size_t k) const {
     return (k == 0 ? at.poses[0].inverse() : SE2(at.poses[k].inverse() * at.poses[k - 1])).adjoint();
@@ -186,6 +196,10 @@ PathDensity::PathDensity(const LandmarkLog& log, BatchOptimum at) {
   if (equations->root.info() != Eigen::Success || !(equations->root.vectorD().minCoeff() > 0))
     cairn::raise("PathDensity: expected a log that determines every pose");
   equations->sigmas = equations->root.vectorD().cwiseSqrt().cwiseInverse();
+  equations->log_determinant = equations->root.vectorD().array().log().sum();
+  equations->for_each_landmark([&](int, const cairn::Cholesky<2>& landmark) {
+    equations->log_determinant -= landmark.log_determinant();
+  });
   equations_ = std::move(equations);
 }
 PathDensity::PathDensity(PathDensity&&) noexcept = default;
@@ -203,7 +217,7 @@ std::size_t PathDensity::size() const noexcept {
 // taken as the residual, and the motions are made one after the other.
 std::vector<SE2> PathDensity::path(const std::vector<double>& white) const {
   CAIRN_EXPECTS(white.size() == size(), "path needs as many numbers as size() says");
-  const auto& [at, moved, residuals, h, root, sigmas] = *equations_;
+  const auto& [at, moved, residuals, h, root, sigmas, log_determinant] = *equations_;
   Eigen::VectorXd z = sigmas;
   for (int i = 0; i < z.size(); ++i) z(i) *= white[static_cast<std::size_t>(i)];
   const Eigen::VectorXd d = root.permutationPinv() * Eigen::VectorXd(root.matrixU().solve(z));
@@ -226,7 +240,7 @@ std::vector<SE2> PathDensity::draw(cairn::Random& random) const {
 
 // The marginal's information is H_xx - H_xm H_mm^-1 H_mx, and landmarks do not meet each other in H.
 double PathDensity::log_density(const std::vector<SE2>& poses) const {
-  const auto& [at, moved, residuals, h, root, sigmas] = *equations_;
+  const auto& [at, moved, residuals, h, root, sigmas, log_determinant] = *equations_;
   Eigen::VectorXd e = Eigen::VectorXd::Zero(h.rows());
   Vector<3> step = Vector<3>::Zero();
   for (std::size_t k = 0; k < poses.size(); ++k) {
@@ -236,14 +250,9 @@ double PathDensity::log_density(const std::vector<SE2>& poses) const {
   }
   const Eigen::VectorXd v = h.selfadjointView<Eigen::Lower>() * e;
   double squared = e.dot(v);
-  double log_determinant = root.vectorD().array().log().sum();  // of the poses' share of h, in the end
-  for (int row = 3 * static_cast<int>(poses.size()); row < h.rows(); row += 2) {
-    Matrix<2> block;
-    block << h.coeff(row, row), h.coeff(row + 1, row), h.coeff(row + 1, row), h.coeff(row + 1, row + 1);
-    const cairn::Cholesky<2> landmark(block);
+  equations_->for_each_landmark([&](int row, const cairn::Cholesky<2>& landmark) {
     squared -= landmark.whiten(Vector<2>(v.segment<2>(row))).squaredNorm();
-    log_determinant -= landmark.log_determinant();
-  }
+  });
   return 0.5 * (log_determinant - squared);
 }
 

@@ -187,8 +187,10 @@ private:
       start.push_back(k == 0 ? best[0] : start[k - 1] * best[k - 1].inverse() * best[k]);
     cairn::Random choice(~options_.seed, (frames_ << 32U) + belief.size());
     std::vector<std::vector<cairn::Association>> seen;
-    for (const std::size_t i : cairn::resampled_indices(belief.particles().weights(), asked,
-                                                        cairn::Resampling::systematic, choice)) {
+    auto particles =
+        cairn::resampled_indices(belief.particles().weights(), asked, cairn::Resampling::systematic, choice);
+    particles.erase(std::unique(particles.begin(), particles.end()), particles.end());  // they ascend
+    for (const std::size_t i : particles) {
       std::vector<SE2> poses;
       for (const auto& each : belief.path(i)) poses.push_back(each.pose);
       poses.erase(poses.begin());  // the start
