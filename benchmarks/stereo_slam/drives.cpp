@@ -68,10 +68,11 @@ std::vector<OtherPath> saved_paths(const std::string& drive, std::size_t frames)
 
 /// The drive with those that are compared with it; libviso2 is shown each pair in turn with the system.
 Drive run_with_rivals(const std::string& name, const stereo_slam::DatasetOptions& what) {
-  const std::unique_ptr<Viso2> viso2 = Viso2::beside(stereo_slam::open_dataset(what)->rig());
+  const auto frames = stereo_slam::open_dataset(what);
+  const std::unique_ptr<Viso2> viso2 = Viso2::beside(frames->rig());
   Beside beside;
   if (viso2) beside = [&](const stereo_slam::StereoFrame& frame) { viso2->step(frame); };
-  Drive drive{run(what, {}, /*and_back=*/false, beside), {}};
+  Drive drive{run(*frames, {}, beside), {}};
   drive.others = saved_paths(name, drive.run.record.frames.size());
   if (viso2)
     drive.others.insert(drive.others.begin(), {"libviso2", viso2->poses(), viso2->cpu_milliseconds()});

@@ -39,6 +39,7 @@
 #include "starry_night.hpp"
 #include "stopwatch.hpp"
 #include "summary.hpp"
+#include "support/command_line.hpp"
 #include "support/scoreboard.hpp"
 
 namespace {
@@ -261,10 +262,7 @@ void add_rate_row(Scoreboard& board) {
              .better = cairn_bench::larger});
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  if (const auto code = cairn_bench::answer(argc, argv, "scoreboard_stereo_slam")) return *code;
+int score() {
   Scoreboard board("stereo_slam");
   if (wanted("video"))
     stereo_slam_bench::add_hour_rows(board, 600 * video_minutes());  // its memory is ours: first
@@ -279,4 +277,12 @@ int main(int argc, char** argv) {
   if (wanted("rate")) add_rate_row(board);
   if (wanted("stores")) stereo_slam_bench::add_store_rows(board);
   return board.finish();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::string name = "scoreboard_stereo_slam";
+  if (const auto code = cairn_bench::answer(argc, argv, name)) return *code;
+  return example::exit_code_of(name, score);
 }

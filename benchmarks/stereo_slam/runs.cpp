@@ -6,33 +6,32 @@
 #include <cstdlib>
 #include <ctime>
 #include <iostream>
-#include <memory>
-#include <string>
 #include <utility>
 
 #include "there_and_back.hpp"
 
 namespace stereo_slam_bench {
 
-Run run(const stereo_slam::DatasetOptions& what, const stereo_slam::PipelineOptions& how, bool and_back,
-        const Beside& beside) {
-  std::cout << "running " << what.kind << ' '
-            << (what.folder.empty() ? what.arena.script : what.folder.string()) << ", seed " << how.seed
-            << std::endl;
-  auto frames = stereo_slam::open_dataset(what);
-  if (and_back) frames = stereo_slam::there_and_back(std::move(frames));
-  stereo_slam::Pipeline pipeline(frames->rig(), how);
+Run run(const stereo_slam::Dataset& frames, const stereo_slam::PipelineOptions& how, const Beside& beside) {
+  std::cout << "running " << frames.name() << ", seed " << how.seed << std::endl;
+  stereo_slam::Pipeline pipeline(frames.rig(), how);
   double cpu = 0;
-  for (std::size_t i = 0; i < frames->size(); ++i) {
-    const stereo_slam::StereoFrame frame = frames->frame(i);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const stereo_slam::StereoFrame frame = frames.frame(i);
     const std::clock_t start = std::clock();
     pipeline.step(frame);
     cpu += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
     if (beside) beside(frame);
   }
-  Run result{pipeline.record(), {}, 1e3 * cpu / static_cast<double>(frames->size())};
+  Run result{pipeline.record(), {}, 1e3 * cpu / static_cast<double>(frames.size())};
   result.summary = stereo_slam::summarise(result.record);
   return result;
+}
+
+Run run(const stereo_slam::DatasetOptions& what, const stereo_slam::PipelineOptions& how, bool and_back) {
+  auto frames = stereo_slam::open_dataset(what);
+  if (and_back) frames = stereo_slam::there_and_back(std::move(frames));
+  return run(*frames, how);
 }
 
 std::filesystem::path data_folder() {

@@ -25,9 +25,12 @@ struct Run {
 /// Who else is shown each frame after the system has seen it: a rival, in turns with it.
 using Beside = std::function<void(const stereo_slam::StereoFrame&)>;
 
-/// All frames of the data set, one after the other; `and_back`: then backwards.
+/// All frames of the data set, one after the other.
+[[nodiscard]] Run run(const stereo_slam::Dataset& frames, const stereo_slam::PipelineOptions& how,
+                      const Beside& beside = {});
+/// The same of the data set that is named; `and_back`: then backwards.
 [[nodiscard]] Run run(const stereo_slam::DatasetOptions& what, const stereo_slam::PipelineOptions& how,
-                      bool and_back = false, const Beside& beside = {});
+                      bool and_back = false);
 
 /// CAIRN_DATA, else ../shared/data.
 [[nodiscard]] std::filesystem::path data_folder();
