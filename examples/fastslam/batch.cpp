@@ -22,13 +22,15 @@ using cairn::Matrix;
 using cairn::SE2;
 using cairn::Vector;
 
+using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
+
 /// The normal equations of the whole log at one estimate: unknowns are steps of the poses, then of the
 /// landmarks.
 class NormalEquations {
 public:
-  NormalEquations(const LandmarkLog& log, const BatchOptimum& at) : log_(log), at_(at) {
+  NormalEquations(const LandmarkLog& log, BatchOptimum at) : log_(&log), at_(std::move(at)) {
     int row = 3 * static_cast<int>(log.frames.size());
-    for (const auto& [id, place] : at.landmarks) {
+    for (const auto& [id, place] : at_.landmarks) {
       row_of_[id] = row;
       row += 2;
     }
@@ -41,13 +43,14 @@ public:
   }
 
   [[nodiscard]] double cost() const { return cost_; }
-  [[nodiscard]] double slope() const { return gradient_.lpNorm<Eigen::Infinity>(); }
+  [[nodiscard]] const BatchOptimum& at() const { return at_; }
 
-  /// The step of the damped equations (H + damping diag H) d = -g.
-  [[nodiscard]] Eigen::VectorXd step(double damping) const {
+  /// The step of the damped equations (H + damping diag H) d = -g. `root` has analysed the matrix of this log
+  /// at any estimate: where it has entries is the same at all.
+  [[nodiscard]] Eigen::VectorXd step(double damping, Factor& root) const {
     Eigen::SparseMatrix<double> h = matrix();
     for (int i = 0; i < gradient_.size(); ++i) h.coeffRef(i, i) *= 1 + damping;
-    const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> root(h);
+    root.factorize(h);
     return root.solve(-gradient_);
   }
   /// The lower triangle of H.
@@ -91,7 +94,7 @@ private:
 
   void add_motion(std::size_t k) {
     const SE2 before = k == 0 ? SE2() : at_.poses[k - 1];
-    const auto& moved = log_.frames[k].moved;
+    const auto& moved = log_->frames[k].moved;
     const Vector<3> e = cairn::local(before * moved.mean, at_.poses[k]);
     const Matrix<3> by_before = -(at_.poses[k].inverse() * before).adjoint();
     const int row = 3 * static_cast<int>(k);
@@ -101,14 +104,14 @@ private:
   void add_sighting(std::size_t k, const Map::Sighting& sighting) {
     const SE2& x = at_.poses[k];
     const Vector<2>& m = at_.landmarks.at(*sighting.identity);
-    const Vector<2> e = -cairn::local(log_.sensor.predict(x, m), sighting.z);
-    const Matrix<2> noise = log_.sensor.noise(x, log_.sensor.initialise(x, sighting.z));
-    add<2, 3, 2>(e, noise, 3 * static_cast<int>(k), log_.sensor.state_jacobian(x, m),
-                 row_of_.at(*sighting.identity), log_.sensor.part_jacobian(x, m));
+    const Vector<2> e = -cairn::local(log_->sensor.predict(x, m), sighting.z);
+    const Matrix<2> noise = log_->sensor.noise(x, log_->sensor.initialise(x, sighting.z));
+    add<2, 3, 2>(e, noise, 3 * static_cast<int>(k), log_->sensor.state_jacobian(x, m),
+                 row_of_.at(*sighting.identity), log_->sensor.part_jacobian(x, m));
   }
 
-  const LandmarkLog& log_;
-  const BatchOptimum& at_;
+  const LandmarkLog* log_;
+  BatchOptimum at_;
   std::map<std::uint32_t, int> row_of_;
   std::vector<Eigen::Triplet<double>> entries_;
   Eigen::VectorXd gradient_;
@@ -126,21 +129,26 @@ BatchOptimum batch_optimum(const LandmarkLog& log, const std::vector<SE2>& start
     for (const auto& sighting : log.frames[k].seen)
       if (sighting.identity)
         best.landmarks.try_emplace(*sighting.identity, log.sensor.initialise(start[k], sighting.z));
-  best.cost = NormalEquations(log, best).cost();
+  NormalEquations equations(log, std::move(best));
+  Factor root;
+  root.analyzePattern(equations.matrix());
   double damping = 1e-4;
-  for (; best.iterations < 200 && !best.converged && damping < 1e12; ++best.iterations) {
-    const NormalEquations equations(log, best);
-    BatchOptimum next = equations.moved(equations.step(damping));
-    next.cost = NormalEquations(log, next).cost();
-    if (!(next.cost < best.cost)) {
+  int iterations = 0;
+  bool converged = false;
+  for (; iterations < 200 && !converged && damping < 1e12; ++iterations) {
+    NormalEquations next(log, equations.moved(equations.step(damping, root)));
+    if (!(next.cost() < equations.cost())) {
       damping *= 10;
       continue;
     }
-    next.iterations = best.iterations;
-    next.converged = best.cost - next.cost < 1e-9 * best.cost;
-    best = std::move(next);
+    converged = equations.cost() - next.cost() < 1e-9 * equations.cost();
+    equations = std::move(next);
     damping = std::max(1e-12, damping / 10);
   }
+  best = equations.at();
+  best.cost = equations.cost();
+  best.iterations = iterations;
+  best.converged = converged;
   return best;
 }
 
@@ -164,7 +172,7 @@ struct PathDensity::Equations {
   std::vector<SE2> moved;            // odometry
   std::vector<Vector<3>> residuals;  // of the motions at the optimum
   Eigen::SparseMatrix<double> h;
-  Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> root;
+  Factor root;
   Eigen::VectorXd sigmas;      // D^-1/2
   double log_determinant = 0;  // of the poses' marginal information
 

@@ -49,8 +49,10 @@ struct PointSensor {
   }
   [[nodiscard]] double reach() const { return farthest; }
   [[nodiscard]] double detection_probability(const State& x, const Part& m) const {
-    const Measurement z = predict(x, m);
-    return z.part<0>()(0) < farthest && std::abs(z.part<1>().angle()) < half_view ? detection : 0;
+    const Part d = m - x.translation();  // asked for every landmark around and not seen: few want an angle
+    if (!(d.squaredNorm() < farthest * farthest)) return 0;
+    const cairn::SO2 bearing(std::atan2(d(1), d(0)) - x.rotation().angle());
+    return std::abs(bearing.angle()) < half_view ? detection : 0;
   }
 };
 

@@ -877,6 +877,7 @@ double LandmarkMap<L, F>::certain_detection(const Pose& x, const Gaussian<Landma
   double least = common_->sensor.detection_probability(x, landmark.mean);
   for (int a = 0; a < dof<Landmark>; ++a)
     for (const double sign : {-1.0, 1.0}) {
+      if (!(least > 0)) return 0;
       Tangent<Landmark> d = Tangent<Landmark>::Zero();
       d(a) = sign * std::sqrt(landmark.covariance(a, a));
       least = std::min(least, common_->sensor.detection_probability(x, retract(landmark.mean, d)));
