@@ -104,8 +104,10 @@ void add_options(CLI::App& app, Options& o) {
   app.add_option("--out", o.out, "folder for the trajectory, the landmarks, the summary and the report");
   app.add_option("--particles", o.slam.particles, "number of particles")
       ->check(example::whole_number(1, 100000));
-  app.add_option("--redraw", o.slam.redraw_every, "draw all paths again every so many frames; 0: never")
-      ->check(example::whole_number(0, 1000000));
+  app.add_option(
+         "--redraw", o.slam.redraw_below,
+         "draw all paths again when fewer than this share of those drawn before have descendants; 0: never")
+      ->check(CLI::Range(0.0, 1.0));
   app.add_option("--seed", o.slam.seed, "the same seed gives the same results for any number of threads")
       ->check(example::whole_number(0));
   app.add_option("--threads", o.slam.threads, "threads")->check(example::whole_number(1, 1024));

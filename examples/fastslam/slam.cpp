@@ -71,6 +71,15 @@ LandmarkLog named(const LandmarkLog& log, const std::vector<cairn::Association>&
   return part;
 }
 
+/// Whether all sightings of the first frames have names that are believed: no path then says otherwise.
+bool all_named(const LandmarkLog& log, std::uint64_t frames, const cairn::LandmarkOptions& options) {
+  if (options.gate_of_named < 1) return false;
+  for (std::uint64_t k = 0; k < frames; ++k)
+    for (const auto& sighting : log.frames[k].seen)
+      if (!sighting.identity) return false;
+  return true;
+}
+
 /// What the particles' own model says of a path: its map, and log p(x_1:t, n_1:t, z_1:t).
 struct Replayed {
   std::vector<SE2> poses;
@@ -181,7 +190,7 @@ private:
     return {std::move(associations), std::move(density), log_evidence};
   }
   Names names_of(const Belief& belief, std::vector<SE2> start) const {
-    constexpr std::size_t asked = 16;
+    const std::size_t asked = all_named(log_, frames_, options_.landmarks) ? 1 : 16;
     const std::vector<SE2> best = means_of(belief, belief.best());
     for (std::size_t k = start.size(); k < frames_; ++k)
       start.push_back(k == 0 ? best[0] : start[k - 1] * best[k - 1].inverse() * best[k]);
@@ -293,6 +302,18 @@ private:
   std::uint64_t rounds_ = 0;
   double length_ = 0.7;  // of a step, of the Gaussian's own spread
 };
+
+/// What is uncertain since before the paths were last drawn is held by the particles' ancestors of then, and
+/// resampling leaves fewer of them with every step: a covariance of few draws is too small, and the paths
+/// that are left bend as the ones that were right by chance. Names are another matter: drawing decides what
+/// the ancestors leave open, and a hundred frames tell more of it than ten.
+bool redraw_is_due(const Belief& belief, const LandmarkLog& log, std::uint64_t last,
+                   const SlamOptions& options) {
+  const std::uint64_t since = belief.steps() - last;
+  if (8 * since < last) return false;
+  if (since < 100 && !all_named(log, belief.steps(), options.landmarks)) return false;
+  return belief.effective_ancestors(last) < options.redraw_below * static_cast<double>(belief.size());
+}
 
 /// Weighted mean of all particles' paths, pose by pose.
 std::vector<SE2> mean_path(const Belief& belief) {
@@ -467,8 +488,8 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
   Belief belief(SE2(), Map(log.sensor, options.landmarks), options.particles);
   const cairn::ConditionalFilter filter{
       .resample_below = options.resample_below, .seed = options.seed, .threads = options.threads};
-  const bool redraws = options.redraw_every > 0 && options.proposal == ProposalKind::landmarks;
-  std::size_t next_redraw = options.redraw_every;
+  const bool redraws = options.redraw_below > 0 && options.proposal == ProposalKind::landmarks;
+  std::uint64_t last_redraw = 0;
   std::vector<SE2> odometry, optimum;
   const std::size_t every = std::max<std::size_t>(1, log.frames.size() / 40);
   for (const Frame& frame : log.frames) {
@@ -477,10 +498,10 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
       cairn::raise("frame " + std::to_string(odometry.size()) + ": " + explain(did.status));
     std::optional<double> redrawn_size;
     const bool is_last = belief.steps() == log.frames.size();  // the path and map that are handed over
-    if (redraws && (belief.steps() == next_redraw || is_last)) {
+    if (redraws && (is_last || redraw_is_due(belief, log, last_redraw, options))) {
       belief = Redrawing(belief, log, options, optimum).redrawn();
       redrawn_size = belief.particles().effective_size();
-      next_redraw += std::max<std::size_t>(options.redraw_every, next_redraw / 8);
+      last_redraw = belief.steps();
     }
     odometry.push_back(odometry.empty() ? frame.moved.mean : odometry.back() * frame.moved.mean);
     r.steps.push_back({frame.time,

@@ -34,10 +34,11 @@ struct SlamOptions {
   ProposalKind proposal = ProposalKind::landmarks;
   double resample_below = 0.5;
   /// With FastSLAM 2.0: all paths are drawn again from the distribution that the filter is of, and without
-  /// names under the associations of one particle. Every so many frames and an eighth of those before,
-  /// whichever is more, so that a log costs O(its length) times its logarithm, and at the log's end. 0:
-  /// never, which is FastSLAM as published.
-  std::size_t redraw_every = 100;
+  /// names under the associations of one particle. Where the particles' effective ancestors of the last time
+  /// are fewer than this share of the particles, but not before an eighth of the frames until then have
+  /// passed, so that a log costs O(its length) times its logarithm, nor, without names, a hundred; and at the
+  /// log's end. 0: never, which is FastSLAM as published.
+  double redraw_below = 0.5;
   cairn::LandmarkOptions landmarks{.pick = cairn::Pick::drawn, .gate = 0.999};
 };
 

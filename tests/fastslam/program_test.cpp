@@ -78,6 +78,15 @@ TEST_SUITE("fastslam/program") {
         CHECK((cairn::read_file(folder / "1" / name) == cairn::read_file(folder / threads / name)) ==
               (name != "timing.json"));
       }
+    // with names paths are drawn again on the way
+    for (const std::string threads : {"1", "2", "7"})
+      REQUIRE(run("--particles 20 --seed 5 --frames 80 --threads " + threads + " --out \"" +
+                  (folder / ("known" + threads)).string() + "\"")
+                  .code == 0);
+    for (const std::string threads : {"2", "7"})
+      for (const std::string name : {"trajectory.txt", "landmarks.csv", "summary.json"})
+        CHECK(cairn::read_file(folder / "known1" / name) ==
+              cairn::read_file(folder / ("known" + threads) / name));
     const auto summary = nlohmann::json::parse(cairn::read_file(folder / "1" / "summary.json"));
     CHECK(summary["frames"] == 60);
     CHECK(summary["identities"] == "withheld");

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 #include <limits>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -254,6 +255,28 @@ TEST_SUITE("filter/conditional") {
     CHECK(belief.path(9).front().pose(0) == 10);
     CHECK(belief[9].map.inserted.empty());
     CHECK(belief[5].pose(0) < 10);
+  }
+
+  TEST_CASE("conditional: ancestors are counted by what their descendants weigh, as the paths have them") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    MappedPaths<Memory> belief(Line(0.0), Memory{}, 40);
+    const ConditionalFilter filter{.seed = seed};
+    CHECK(belief.effective_ancestors(0) == doctest::Approx(40));
+    for (int step = 0; step < 12; ++step) {
+      REQUIRE(filter.step(belief, motion, FromMotion{}, step + 1.0).accepted());
+      CHECK(belief.effective_ancestors(belief.steps()) >=
+            doctest::Approx(belief.effective_ancestors(1)));  // lines only run together
+    }
+    const std::vector<double> weights = belief.particles().weights();
+    for (const std::size_t step : {1U, 5U, 9U, 12U}) {
+      std::map<double, double> families;  // poses are drawn: no two ancestors' are the same
+      for (std::size_t i = 0; i < belief.size(); ++i) families[belief.path(i)[step].pose(0)] += weights[i];
+      double squares = 0;
+      for (const auto& [pose, weight] : families) squares += weight * weight;
+      CHECK(belief.effective_ancestors(step) == doctest::Approx(1 / squares));
+    }
+    CHECK(belief.effective_ancestors(1) < 20);
   }
 }
 

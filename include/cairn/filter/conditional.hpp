@@ -360,6 +360,32 @@ public:
     put(to, (*this)[from].node, (*this)[from].map);
   }
 
+  /// Effective number of the ancestors that the particles had at a step: one over the sum of the squares of
+  /// what weight each one's descendants have together. What is uncertain since before that step is held by so
+  /// many draws, however many particles there are. O(particles and poses stored since).
+  [[nodiscard]] double effective_ancestors(std::uint64_t step) const {
+    CAIRN_EXPECTS(step <= step_, "effective_ancestors needs a step that was");
+    const std::vector<double> weights = particles_.weights();
+    std::vector<std::pair<std::uint32_t, double>> lines;  // a node, the weight below it
+    for (std::size_t i = 0; i < size(); ++i) lines.emplace_back((*this)[i].node, weights[i]);
+    for (std::uint64_t back = step_;; --back) {
+      std::ranges::sort(lines, {}, &std::pair<std::uint32_t, double>::first);
+      std::size_t kept = 0;
+      for (std::size_t i = 1; i < lines.size(); ++i) {
+        if (lines[i].first == lines[kept].first)
+          lines[kept].second += lines[i].second;
+        else
+          lines[++kept] = lines[i];
+      }
+      lines.resize(kept + 1);
+      if (back == step) break;
+      for (auto& line : lines) line.first = paths_.parent(line.first);
+    }
+    double squares = 0;
+    for (const auto& line : lines) squares += line.second * line.second;
+    return 1 / squares;
+  }
+
   /// Poses stored for all paths together.
   [[nodiscard]] std::size_t stored_poses() const noexcept { return paths_.size(); }
 
