@@ -55,7 +55,7 @@ SlamOptions options_of(std::size_t particles, std::uint64_t seed) {
 }
 
 struct Runs {
-  std::vector<double> path, landmarks;
+  std::vector<double> path, landmarks, nees;  ///< NEES: of the pose, median over the log's frames
 };
 Runs runs_of(const LandmarkLog& log, std::size_t particles) {
   Runs runs;
@@ -63,8 +63,12 @@ Runs runs_of(const LandmarkLog& log, std::size_t particles) {
     const Results r = run(log, options_of(particles, seed));
     runs.path.push_back(*r.path_error);
     runs.landmarks.push_back(r.landmark_error.value_or(0));
+    std::vector<double> nees;
+    for (const StepRecord& step : r.steps)
+      if (step.nees) nees.push_back(*step.nees);
+    runs.nees.push_back(median(nees));
     std::cerr << log.name << ", seed " << seed << ": path " << runs.path.back() << " m, landmarks "
-              << runs.landmarks.back() << " m\n";
+              << runs.landmarks.back() << " m, NEES " << runs.nees.back() << ", " << r.cpu_seconds << " s\n";
   }
   return runs;
 }
@@ -104,6 +108,8 @@ void add_robots(Scoreboard& board) {
     Row path{.name = title + "path, identities known, M = 20", .unit = "m", .must = 0.25, .aim = 0.15};
     Row landmarks{.name = title + "landmarks", .unit = "m", .must = 0.15, .aim = 0.08};
     Row ratio{.name = title + "path, withheld, M = 100, over known", .unit = "x", .must = 1.5, .aim = 1.1};
+    Row nees{.name = title + "NEES of the pose, median of the frames (2.4 is right), known, M = 20",
+             .unit = ""};
     if (folder) {
       LandmarkLog log = read_mrclam(*folder, robot);
       const Runs known = runs_of(log, 20);
@@ -117,12 +123,15 @@ void add_robots(Scoreboard& board) {
       landmarks.note = worst(known.landmarks);
       ratio.measured = median(withheld.path) / median(known.path);
       ratio.note = worst(withheld.path) + " m";
+      nees.measured = median(known.nees);
+      nees.note = worst(known.nees) + "; withheld, M = 100: " + std::to_string(median(withheld.nees));
     } else {
-      path.note = landmarks.note = ratio.note = "no data";
+      path.note = landmarks.note = ratio.note = nees.note = "no data";
     }
     board.add(path);
     board.add(landmarks);
     board.add(ratio);
+    board.add(nees);
   }
 }
 

@@ -123,6 +123,8 @@ LandmarkLog read_mrclam(const std::filesystem::path& folder, int robot) {
       .landmarks = files.landmarks,
   };
   for (const Row& r : files.truth) log.truth.push_back({r[0], {r[1], r[2], r[3]}});
+  for (const auto& [time, pose] : log.truth)  // where it was when odometry began
+    if (!log.start || time <= files.odometry.front()[0]) log.start = pose;
   std::set<int> unknown;
   Wheels wheels(log, folder / (name + "_Odometry.dat"), files.odometry.front()[0]);
   std::size_t next = 0;

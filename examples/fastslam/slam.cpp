@@ -512,9 +512,8 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
                        belief[0].map.size(),
                        belief.pose(),
                        {}});
-    if (log.start && log.truth.size() == log.frames.size())
-      r.steps.back().nees =
-          cairn::nees(r.steps.back().pose, log.start->inverse() * log.truth[r.steps.size() - 1].pose);
+    if (const StampedPose2* truth = log.start ? last_until(log.truth, frame.time) : nullptr)
+      r.steps.back().nees = cairn::nees(r.steps.back().pose, log.start->inverse() * truth->pose);
     if (odometry.size() % every == 0) r.snapshots.push_back(snapshot_of(belief, frame.time));
     if (on_frame) r.ended_early = on_frame();
     if (r.ended_early) break;
