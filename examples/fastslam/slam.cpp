@@ -103,9 +103,10 @@ Replayed replayed(const LandmarkLog& log, const std::vector<cairn::Association>&
 
 /// A path that is being moved: the numbers that PathDensity makes it of, and how it is weighed.
 struct Moving {
+  std::size_t names;  ///< of its sightings: which of those that are looked at
   std::vector<double> white;
   std::shared_ptr<const Replayed> replayed;
-  double log_ratio = 0;  ///< of the particles' own model over the Gaussian that the path was drawn from
+  double log_ratio = 0;  ///< of the particles' own model over what names and path were drawn from
 };
 
 /// How far a power of the ratios may go on from here with `least` of them left as an effective number.
@@ -136,11 +137,11 @@ double next_power(const std::vector<Moving>& all, double power, double least) {
 /// up for the ratio (P. Del Moral, A. Doucet, A. Jasra, "Sequential Monte Carlo samplers", JRSS B 68, 2006;
 /// the step of S. Cotter, G. Roberts, A. Stuart, D. White, Statistical Science 28, 2013, whose length does
 /// not depend on how many numbers a path has). O(M frames log landmarks) for each power, and a sparse least
-/// squares. Where sightings have no names, those of one particle stand for all: all but the newest have the
-/// particles in common anyway, for they have the same ancestors. Of several it is drawn by how likely its
-/// names are when the path that they go with is integrated out, by Laplace's approximation: what a particle's
-/// weight says of its names is blurred by the chance bends of its own path. `optimum` is where the last one
-/// was, and then where this one is.
+/// squares. Where sightings have no names, sixteen particles are asked for theirs, and each path is drawn
+/// with those of one of them: as often as they are likely when the path that they go with is integrated out,
+/// by Laplace's approximation, for what a particle's weight says of its names is blurred by the chance bends
+/// of its own path. The ratio is over both, and so makes up for what the approximation errs by. `optimum` is
+/// where the last one was, and then where that of the likeliest names is.
 class Redrawing {
 public:
   Redrawing(const Belief& belief, const LandmarkLog& log, const SlamOptions& options,
@@ -151,14 +152,15 @@ public:
         empty_(log.sensor, options.landmarks),
         names_(names_of(belief, optimum)),
         all_(belief.size()) {
-    optimum = names_.density.optimum().poses;
+    optimum = std::ranges::max_element(names_, {}, &Names::log_share)->density.optimum().poses;
   }
 
   [[nodiscard]] Belief redrawn() {
+    const std::vector<std::size_t> drawn = drawn_names();
     each([&](std::size_t i, cairn::Random& random) {
-      std::vector<double> white(names_.density.size());
+      std::vector<double> white(names_[drawn[i]].density.size());
       for (double& v : white) v = random.normal(0, 1);
-      all_[i] = moving(std::move(white));
+      all_[i] = moving(drawn[i], std::move(white));
     });
     constexpr int most_powers = 400;
     double power = 0;
@@ -179,7 +181,7 @@ private:
   struct Names {
     std::vector<cairn::Association> associations;
     PathDensity density;
-    double log_evidence;  ///< of the names, the path integrated out
+    double log_share;  ///< of the names among all that are looked at, the path integrated out
   };
   Names named_so(std::vector<cairn::Association> associations, const std::vector<SE2>& start) const {
     const LandmarkLog part = named(log_, associations);
@@ -189,7 +191,7 @@ private:
         replayed(log_, associations, poses, empty_).log_density - density.log_density(poses);
     return {std::move(associations), std::move(density), log_evidence};
   }
-  Names names_of(const Belief& belief, std::vector<SE2> start) const {
+  std::vector<Names> names_of(const Belief& belief, std::vector<SE2> start) const {
     const std::size_t asked = all_named(log_, frames_, options_.landmarks) ? 1 : 16;
     const std::vector<SE2> best = means_of(belief, belief.best());
     for (std::size_t k = start.size(); k < frames_; ++k)
@@ -211,19 +213,29 @@ private:
     cairn::parallel_for(seen.size(), options_.threads, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) all[i].emplace(named_so(std::move(seen[i]), start));
     });
-    std::vector<double> log_weights, weights;
-    for (const auto& names : all) log_weights.push_back(names->log_evidence);
-    const double total = cairn::log_sum_exp(log_weights);
-    for (const double w : log_weights) weights.push_back(std::exp(w - total));
-    return std::move(
-        *all[cairn::resampled_indices(weights, 1, cairn::Resampling::systematic, choice).front()]);
+    std::vector<double> log_evidence;
+    for (const auto& names : all) log_evidence.push_back(names->log_share);
+    const double total = cairn::log_sum_exp(log_evidence);
+    std::vector<Names> result;
+    for (auto& names : all) {
+      names->log_share -= total;
+      result.push_back(std::move(*names));
+    }
+    return result;
+  }
+  /// For each path, by their shares.
+  std::vector<std::size_t> drawn_names() {
+    std::vector<double> shares;
+    for (const Names& names : names_) shares.push_back(std::exp(names.log_share));
+    cairn::Random random(~options_.seed, (frames_ << 32U) + ++rounds_ * (all_.size() + 1));
+    return cairn::resampled_indices(shares, all_.size(), cairn::Resampling::systematic, random);
   }
 
-  Moving moving(std::vector<double> white) const {
-    auto replay = std::make_shared<const Replayed>(
-        replayed(log_, names_.associations, names_.density.path(white), empty_));
-    const double log_ratio = replay->log_density - names_.density.log_density(replay->poses);
-    return {std::move(white), std::move(replay), log_ratio};
+  Moving moving(std::size_t names, std::vector<double> white) const {
+    const auto& [associations, density, log_share] = names_[names];
+    auto replay = std::make_shared<const Replayed>(replayed(log_, associations, density.path(white), empty_));
+    const double log_ratio = replay->log_density - density.log_density(replay->poses) - log_share;
+    return {names, std::move(white), std::move(replay), log_ratio};
   }
 
   /// Calls visit(i, random) for all; none of these numbers are the filter's.
@@ -260,7 +272,7 @@ private:
         std::vector<double> white = all_[i].white;
         const double kept = std::sqrt(1 - length_ * length_);
         for (double& v : white) v = kept * v + random.normal(0, length_);
-        Moving other = moving(std::move(white));
+        Moving other = moving(all_[i].names, std::move(white));
         if (std::log(random.uniform()) >= power * (other.log_ratio - all_[i].log_ratio)) return;
         all_[i] = std::move(other);
         taken[i] = 1;
@@ -297,7 +309,7 @@ private:
   const SlamOptions& options_;
   std::uint64_t frames_;
   Map empty_;
-  Names names_;
+  std::vector<Names> names_;
   std::vector<Moving> all_;
   std::uint64_t rounds_ = 0;
   double length_ = 0.7;  // of a step, of the Gaussian's own spread

@@ -34,10 +34,10 @@ struct SlamOptions {
   ProposalKind proposal = ProposalKind::landmarks;
   double resample_below = 0.5;
   /// With FastSLAM 2.0: all paths are drawn again from the distribution that the filter is of, and without
-  /// names under the associations of one particle. Where the particles' effective ancestors of the last time
-  /// are fewer than this share of the particles, but not before an eighth of the frames until then have
-  /// passed, so that a log costs O(its length) times its logarithm, nor, without names, a hundred; and at the
-  /// log's end. 0: never, which is FastSLAM as published.
+  /// names with the names that some of the particles have. Where the particles' effective ancestors of the
+  /// last time are fewer than this share of the particles, but not before an eighth of the frames until then
+  /// have passed, so that a log costs O(its length) times its logarithm, nor, without names, a hundred; and
+  /// at the log's end. 0: never, which is FastSLAM as published.
   double redraw_below = 0.5;
   cairn::LandmarkOptions landmarks{.pick = cairn::Pick::drawn, .gate = 0.999};
 };
