@@ -12,6 +12,8 @@
 #include <cairn/core/random.hpp>
 #include <cairn/filter/conditional.hpp>
 
+#include "batch.hpp"
+
 namespace line_slam {
 
 namespace {
@@ -118,8 +120,14 @@ Results run(const Drive& drive, const RunOptions& options,
     if (r.ended_early) break;
   }
   const std::size_t best = belief.best();
-  r.slam.path = path_of(belief, best);
-  judge(r.slam, belief[best].map, drive);
+  if (options.smoothings == 0) {
+    r.slam.path = path_of(belief, best);
+    judge(r.slam, belief[best].map, drive);
+  } else {
+    std::vector<SE3> path = path_of(belief, best);
+    for (int i = 0; i < options.smoothings; ++i) path = smoothed(drive, path, empty);
+    r.slam = mapped_along(drive, std::move(path), empty);
+  }
   for (std::size_t i = 0; i < belief.size(); ++i)
     if (i == 0 || belief[i].node != belief[i - 1].node) r.paths.push_back(path_of(belief, i));
   const auto frames = static_cast<std::ptrdiff_t>(odometry.size());

@@ -26,6 +26,9 @@ struct RunOptions {
   std::uint64_t seed = 1;
   unsigned threads = 1;
   double resample_below = 0.5;
+  /// How often the best particle's path is led to the least squares of all that was seen along it, and mapped
+  /// along anew: a particle never goes back, so that what a loop tells at its end bends nothing before.
+  int smoothings = 2;
   /// Densities over the six distances: a line anywhere in a picture of 640 x 480 pixels is as likely as any
   /// other, at distances from a metre on; the third camera's two numbers are then known but for the noise.
   cairn::LandmarkOptions landmarks{.gate = 0.999, .new_density = 1e-10, .clutter_density = 1e-11};
