@@ -81,7 +81,7 @@ void parts(Archive& archive, Loop& l) {
 namespace {
 
 constexpr std::string_view kind = "cairngrd";
-constexpr std::uint64_t version = 2;
+constexpr std::uint64_t version = 3;
 
 /// Grids that share tiles: every tile once, and for each grid the numbers of its own.
 template <class Cell>
@@ -194,7 +194,7 @@ bool growing(const std::vector<double>& numbers) {
 template <class Archive>
 void Mapper::plain_parts(Archive& archive, Mapper& m) {
   archive(m.steps_, m.points_, m.travelled_, m.scans_, m.loops_);
-  archive(m.motion_.forwards, m.motion_.backwards, m.motion_.distance, m.motion_.angle, m.motion_.stood);
+  archive(m.motion_.distance, m.motion_.angle, m.motion_.stood, m.delay_);
   archive(m.looked_, m.asked_, m.asked_at_);
 }
 

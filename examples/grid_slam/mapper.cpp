@@ -3,6 +3,7 @@
 #include "mapper.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -202,11 +203,8 @@ cairn::Gaussian<SE2> Mapper::place_in_window(const cairn::StampedScan& scan) {
 }
 
 void Mapper::accumulate(const SE2& moved) {
-  const Vector<3> step = moved.log();
-  motion_.forwards = motion_.forwards * moved;
-  motion_.backwards = motion_.backwards * SE2::exp(Vector<3>(-step(0), -step(1), step(2)));
   motion_.distance += moved.translation().norm();
-  motion_.angle += std::abs(step(2));
+  motion_.angle += std::abs(moved.angle());
 }
 
 Matrix<3> Mapper::motion_noise() const {
@@ -219,26 +217,50 @@ Matrix<3> Mapper::motion_noise() const {
   return Vector<3>(along * along, along * along, turn * turn).asDiagonal();
 }
 
+cairn::Gaussian<SE2> Mapper::motion_step(bool forwards) const {
+  const std::size_t from = steps_.back().scan, to = scans_.size() - 1;
+  const double delay = delay_.mean(), spread = delay_.spread(), least = std::max(0.0, delay - spread);
+  const SE2 early = delayed_motion(scans_, from, to, delay + spread, forwards);
+  const SE2 late = delayed_motion(scans_, from, to, least, forwards);
+  Vector<3> open = cairn::local(late, early) * (spread / (delay + spread - least));
+  open.head<2>().setZero();  // where it starts and stops it is odometry's own noise that counts
+  // The way is odometry's own: where it starts and stops, a delay moves it by less than its noise.
+  const cairn::Vector<2> way = delayed_motion(scans_, from, to, 0, forwards).translation();
+  const double turn = delayed_motion(scans_, from, to, delay, forwards).angle();
+  return {SE2(way(0), way(1), turn), motion_noise() + open * open.transpose()};
+}
+
+void Mapper::learn_delay(const Matrix<3>& noise) {
+  const auto& newest = belief_->newest(belief_->best());
+  const double seen = newest.drawn_from.covariance(2, 2);
+  if (seen > 0.25 * noise(2, 2)) return;  // the scan did not say how far the robot turned
+  const SE2 moved = newest.before.inverse() * newest.drawn_from.mean;
+  delay_.learn(scans_, steps_.back().scan, scans_.size() - 1, moved.angle(), std::sqrt(noise(2, 2) + seen));
+}
+
 void Mapper::process(const cairn::StampedScan& scan) {
   const std::size_t index = scans_.size() - 1;
+  const bool first = steps_.empty();
   const Matrix<3> noise = motion_noise();
+  const std::array<cairn::Gaussian<SE2>, 2> ways =
+      first ? std::array<cairn::Gaussian<SE2>, 2>{} : std::array{motion_step(true), motion_step(false)};
   const bool stopped =
       index > 0 && (scans_[index - 1].T_odom_laser.inverse() * scan.T_odom_laser).translation().norm() <
                        options_.standstill;
   const bool may_turn_back = motion_.stood && motion_.distance > 2 * options_.standstill;
-  const double far = options_.slip_distance, round = options_.slip_angle;
-  const Matrix<3> slipped = noise + Matrix<3>(Vector<3>(far * far, far * far, round * round).asDiagonal());
+  const double far = options_.slip_distance, aside = options_.slip_aside, round = options_.slip_angle;
+  const Matrix<3> slipped = Vector<3>(far * far, aside * aside, round * round).asDiagonal();
   const auto motion = [&](const SE2& x, std::size_t regime) {
     cairn::RegimeMotion<SE2> result;
-    if (steps_.empty()) return cairn::RegimeMotion<SE2>{{{regime, 1, {x, noise}}}};
+    if (first) return cairn::RegimeMotion<SE2>{{{regime, 1, {x, noise}}}};
     const auto mode = [&](std::size_t way, double share) {
-      result.modes.push_back({way, share, {x * (way == 0 ? motion_.forwards : motion_.backwards), noise}});
+      result.modes.push_back({way, share, {x * ways[way].mean, ways[way].covariance}});
     };
     const double turn = may_turn_back ? options_.turn_back : options_.turn_unseen;
     mode(regime, 1 - turn - options_.slip);
     mode(1 - regime, turn);
     mode(regime, options_.slip);
-    result.modes.back().motion.covariance = slipped;
+    result.modes.back().motion.covariance += slipped;
     return result;
   };
   points_.push_back(cairn::scan_points(scan.scan));
@@ -252,6 +274,7 @@ void Mapper::process(const cairn::StampedScan& scan) {
   const cairn::MappingStep step = filter.step(*belief_, motion, proposal, points_.back());
   if (!step.accepted())
     cairn::raise("grid_slam: scan " + std::to_string(index) + ": " + cairn::explain(step.status));
+  if (!first) learn_delay(noise);
   travelled_.push_back(travelled_.back() + motion_.distance);
   steps_.push_back({index, step.effective_size, step.resampled, false, belief_->pose()});
   const bool still_open = motion_.stood && !may_turn_back;  // it has only turned since it stood
@@ -262,30 +285,42 @@ void Mapper::process(const cairn::StampedScan& scan) {
 
 void Mapper::look_for_loop() {
   const LoopOptions& options = options_.loops;
-  if (travelled_.back() - looked_ < options.check_every) return;
-  looked_ = travelled_.back();
+  const double before = looked_, now = travelled_.back();
+  if (now - before < options.check_every) return;
+  looked_ = now;
   const auto path = belief_->path(belief_->best());
   const std::vector<SE2> poses = poses_on(path);
   const StepChain chain = drawn_steps(path);
-  for (const std::size_t first : old_places(poses, chain)) {
-    const Matrix<3> covariance = covariance_between(chain, first, poses.size() - 1);
-    const std::optional<Loop> loop = measured_loop(poses, first, covariance);
+  for (const std::size_t near : old_places(poses, chain)) {
+    const Matrix<3> uncertain = covariance_between(chain, near, poses.size() - 1);
+    const LoopWindow window = loop_window(uncertain);
+    // A wide look costs more, and one of them is enough to make the next ones narrow.
+    if (!(std::floor(now / window.every) > std::floor(before / window.every))) continue;
+    const std::optional<Loop> loop = measured_loop(poses, near, window);
     if (!loop) continue;
     const SE2 seen = poses[loop->first].inverse() * poses[loop->last];
     const Vector<3> error = cairn::local(seen, loop->T_first_last);
-    const cairn::Cholesky<3> root(Matrix<3>(covariance + loop->covariance));
+    const cairn::Cholesky<3> root(
+        Matrix<3>(covariance_between(chain, loop->first, loop->last) + loop->covariance));
     if (!root.good() || root.whiten(error).squaredNorm() > options.gate) continue;
-    take_loop(*loop, error);
+    take_loop(*loop, error, window.every);
     return;
   }
 }
 
-void Mapper::take_loop(const Loop& loop, const Vector<3>& error) {
+Mapper::LoopWindow Mapper::loop_window(const Matrix<3>& covariance) const {
+  const LoopOptions& options = options_.loops;
+  const double reach = std::clamp(3 * std::sqrt(covariance(0, 0) + covariance(1, 1)), 0.3, options.reach);
+  const double turn = std::clamp(3 * std::sqrt(covariance(2, 2)), 0.05, 0.35);
+  return {reach, turn, std::max(options.check_every, options.check_share * reach)};
+}
+
+void Mapper::take_loop(const Loop& loop, const Vector<3>& error, double every) {
   const LoopOptions& options = options_.loops;
   const bool far = error.head<2>().norm() > options.moved || std::abs(error(2)) > options.turned;
   if (far) {
     // One look may be deceived by places that look alike; two that ask for the same are believed.
-    const bool again = asked_ && travelled_.back() - asked_at_ < 2.5 * options.check_every &&
+    const bool again = asked_ && travelled_.back() - asked_at_ < 2.5 * every &&
                        (error - *asked_).head<2>().norm() < 0.1 + 0.2 * error.head<2>().norm() &&
                        std::abs(error(2) - (*asked_)(2)) < 0.03;
     asked_ = error;
@@ -317,43 +352,59 @@ std::vector<std::size_t> Mapper::old_places(const std::vector<SE2>& poses, const
     left = travelled_[k];
   }
   std::vector<std::size_t> near;
-  for (const Place& place : places) {
-    const Matrix<3> covariance = covariance_between(chain, place.pose, poses.size() - 1);
-    if (place.distance < 2 + 3 * std::sqrt(covariance(0, 0) + covariance(1, 1))) near.push_back(place.pose);
-    if (near.size() == options.places) break;  // the oldest: they tell most
-  }
+  for (const bool in_sight : {true, false})  // those first, then the oldest: they tell most
+    for (const Place& place : places) {
+      if ((place.distance <= 0.5 * options.view) != in_sight || near.size() == options.places) continue;
+      const Matrix<3> covariance = covariance_between(chain, place.pose, poses.size() - 1);
+      if (place.distance < 2 + 3 * std::sqrt(covariance(0, 0) + covariance(1, 1))) near.push_back(place.pose);
+    }
   return near;
 }
 
-std::optional<Loop> Mapper::measured_loop(const std::vector<SE2>& poses, std::size_t first,
-                                          const Matrix<3>& covariance) const {
+std::optional<Loop> Mapper::measured_loop(const std::vector<SE2>& poses, std::size_t near,
+                                          const LoopWindow& window) const {
   const LoopOptions& options = options_.loops;
   const auto by_path = [&](double at) {
     return static_cast<std::size_t>(std::ranges::lower_bound(travelled_, at) - travelled_.begin());
   };
-  const std::size_t begin = std::max<std::size_t>(1, by_path(travelled_[first] - options.submap));
-  const std::size_t end = std::min(by_path(travelled_[first] + options.submap), poses.size());
+  // As far as scans see, what stands around `near` is seen from the window; beyond, the way there has to be.
+  const double submap = options.submap + std::max(0.0, window.reach - 0.5 * options.view);
+  const std::size_t begin = std::max<std::size_t>(1, by_path(travelled_[near] - submap));
+  const std::size_t end = std::max(
+      near + 1, std::min(by_path(travelled_[near] + submap), by_path(travelled_.back() - options.apart)));
   cairn::OccupancyGrid grid = empty_map().grid;
   for (std::size_t i = begin; i < end; ++i) grid.insert(poses[i], points_[i - 1]);
   const std::size_t last = poses.size() - 1;
   const std::size_t since = std::max<std::size_t>(1, by_path(travelled_[last] - options.query));
   const std::vector<ScanPoint> query = cairn::thinned(seen_together(poses, points_, since, last), 0.05);
-  const double sigma_x = std::sqrt(covariance(0, 0) + covariance(1, 1));
-  const double sigma_angle = std::sqrt(covariance(2, 2));
-  const double reach = std::clamp(3 * sigma_x, 0.3, options.reach),
-               turn = std::clamp(3 * sigma_angle, 0.05, 0.35);
   const SE2 now = poses[last];
-  const cairn::CorrelativeSearch search(scores_around(grid, now.x(), now.y(), 12 + options.reach), 6);
-  std::vector<ScanPoint> near;
+  const int levels = window.reach > 0.5 * options.view ? 8 : 6;  // a wide window is worth two more to build
+  const cairn::CorrelativeSearch search(scores_around(grid, now.x(), now.y(), options.view + window.reach),
+                                        levels);
+  std::vector<ScanPoint> seen;
   for (const ScanPoint& p : query)
-    if (std::hypot(p.x, p.y) < 12) near.push_back(p);
-  const std::vector<ScanPoint> coarse = cairn::thinned(near, 0.25);
-  const auto found = search.find(coarse, now, {reach, reach, turn}, options.enough_score);
+    if (std::hypot(p.x, p.y) < options.view) seen.push_back(p);
+  const std::vector<ScanPoint> coarse = cairn::thinned(seen, 0.25);
+  const cairn::SearchWindow around{window.reach, window.reach, window.turn};
+  const auto found = search.find(coarse, now, around, options.enough_score);
   if (!found) return std::nullopt;
   const cairn::MatchOptions fine{.model = options_.model};
-  const auto result = cairn::match(grid, near, found->pose, found->pose, Matrix<3>::Zero(), fine);
+  const auto result = cairn::match(grid, seen, found->pose, found->pose, Matrix<3>::Zero(), fine);
   const cairn::Cholesky<3> information(result.information);
   if (result.matched < options.enough_inliers || !information.good()) return std::nullopt;
+  const SE2 shift = now.inverse() * found->pose;
+  if (shift.translation().norm() > options.moved || std::abs(shift.angle()) > options.turned) {
+    // In a corridor whose doors all look alike the best place is one of many.
+    const auto places =
+        search.find_places(coarse, now, around, 2, {options.look_alike, 1}, options.enough_score);
+    if (places.size() == 2 && places[1].score > options.still_alike * places[0].score) return std::nullopt;
+  }
+  std::size_t first = begin;
+  const auto distance = [&](std::size_t i) {
+    return (poses[i].translation() - result.pose.translation()).norm();
+  };
+  for (std::size_t i = begin; i < end; ++i)
+    if (distance(i) < distance(first)) first = i;
   const Matrix<3> floor = Vector<3>(1e-4, 1e-4, 1e-5).asDiagonal();
   return Loop{first, last, poses[first].inverse() * result.pose, information.inverse() + floor};
 }
@@ -386,7 +437,7 @@ std::vector<cairn::StampedPose2> Mapper::trajectory(bool means) const {
   const auto path = belief().path(belief().best());
   return filled_path(
       scans_, steps_.size(), [&](std::size_t k) { return steps_[k].scan; },
-      [&](std::size_t k) { return means ? path[k + 1].drawn_from.mean : path[k + 1].pose; });
+      [&](std::size_t k) { return means ? path[k + 1].drawn_from.mean : path[k + 1].pose; }, delay_.mean());
 }
 
 std::vector<cairn::StampedPose2> Mapper::rematched() const {

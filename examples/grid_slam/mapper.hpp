@@ -24,6 +24,7 @@
 
 #include "loop_closing.hpp"
 #include "occupancy_map.hpp"
+#include "scan_delay.hpp"
 
 namespace grid_slam {
 
@@ -38,7 +39,11 @@ struct LoopOptions {
   double check_every = 0.5;   ///< [m] of path between two looks
   double apart = 12;          ///< [m] of path between a place and its revisit
   std::size_t places = 3;     ///< old places that are looked at, at most
-  double reach = 6;           ///< [m]: places farther from where the robot believes to be are not looked at
+  double reach = 25;          ///< [m]: places farther from where the robot believes to be are not looked at
+  double check_share = 0.1;   ///< of how far a look reaches: the least path between two
+  double view = 12;           ///< [m]: what is farther from the robot is not compared
+  double look_alike = 0.7;    ///< [m] between two places that are told apart
+  double still_alike = 0.9;   ///< of the best place's score: a second place with more makes it one of many
   double spacing = 3;         ///< [m] of path between two loops that are kept
   double submap = 4;          ///< [m] of path to either side of the old place
   double query = 3;           ///< [m] of path before the new one
@@ -64,7 +69,8 @@ struct MapperOptions {
   double turn_back = 0.04;      ///< probability that it goes on in the other direction
   double turn_unseen = 0.002;   ///< the same where no standstill was seen
   double slip = 0.002;          ///< probability that odometry says little: a collision, a push
-  double slip_distance = 0.25;  ///< [m], standard deviation of the motion then
+  double slip_distance = 0.25;  ///< [m], standard deviation of the motion then, along
+  double slip_aside = 0.25;     ///< [m], and to the side, where wheels give way last
   double slip_angle = 0.25;     ///< [rad]
   double resample_below = 0.5;
   double evidence_share = 0.12;
@@ -132,6 +138,8 @@ public:
   [[nodiscard]] const std::vector<Loop>& loops() const noexcept { return loops_; }
   /// Of a mapper that has taken a scan.
   [[nodiscard]] const Belief& belief() const;
+  /// How far scans lag behind odometry, as far as turns have shown.
+  [[nodiscard]] const ScanDelay& delay() const noexcept { return delay_; }
   /// Of a localiser with a window that has taken a scan: the place where it began, then those that look like
   /// it, if any.
   [[nodiscard]] const std::vector<PossiblePlace>& places() const noexcept { return places_; }
@@ -143,8 +151,8 @@ public:
   [[nodiscard]] std::vector<cairn::StampedPose2> rematched() const;
 
 private:
+  /// Since the last processed scan.
   struct Motion {
-    cairn::SE2 forwards, backwards;
     double distance = 0, angle = 0;
     bool stood = false;
   };
@@ -158,12 +166,21 @@ private:
   void accumulate(const cairn::SE2& moved);
   void process(const cairn::StampedScan& scan);
   [[nodiscard]] cairn::Matrix<3> motion_noise() const;
+  /// Of the step to the newest scan: what the delay leaves open is a part of the covariance.
+  [[nodiscard]] cairn::Gaussian<cairn::SE2> motion_step(bool forwards) const;
+  void learn_delay(const cairn::Matrix<3>& noise);
   void look_for_loop();
   [[nodiscard]] std::vector<std::size_t> old_places(const std::vector<cairn::SE2>& poses,
                                                     const StepChain& chain) const;
-  void take_loop(const Loop& loop, const cairn::Vector<3>& error);
-  [[nodiscard]] std::optional<Loop> measured_loop(const std::vector<cairn::SE2>& poses, std::size_t first,
-                                                  const cairn::Matrix<3>& covariance) const;
+  /// Where an old place is looked for: by how far the path between has become uncertain.
+  struct LoopWindow {
+    double reach, turn;  // [m], [rad] to either side
+    double every;        // [m] of path between two looks
+  };
+  [[nodiscard]] LoopWindow loop_window(const cairn::Matrix<3>& covariance) const;
+  void take_loop(const Loop& loop, const cairn::Vector<3>& error, double every);
+  [[nodiscard]] std::optional<Loop> measured_loop(const std::vector<cairn::SE2>& poses, std::size_t near,
+                                                  const LoopWindow& window) const;
   void move_paths();
   [[nodiscard]] OccupancyMap empty_map() const;
 
@@ -179,6 +196,7 @@ private:
   std::vector<cairn::StampedScan> scans_;
   std::vector<Loop> loops_;
   Motion motion_;
+  ScanDelay delay_;
   double looked_ = 0;                      // travelled at the last look for a loop
   std::optional<cairn::Vector<3>> asked_;  // error of the last loop that asked for a move
   double asked_at_ = 0;

@@ -56,11 +56,15 @@ struct FromMatch {
   double thinning = 0.1;                             ///< [m] of the points that coarse searches look at
   /// Motions of a smaller share are tried only where the others explain the scan badly, and taken only where
   /// they explain it well: where nothing does, it is the map that is wrong.
-  double likely_share = 0.05;
+  double likely_share = 0.03;
   double explained_badly = 0.75;  ///< share of inliers below which the others are tried
   double explained_well = 0.75;   ///< share from which on they are taken
   double rare_share = 0.01;       ///< motions below this have to explain the scan still better
   double rare_explained = 0.88;
+  /// Such a motion has to explain the scan better than the likely ones, by so much for each independent beam:
+  /// where furniture was moved, a wrong place gains half a nat and now and then a whole one. A robot that
+  /// drives the other way unseen makes the likely place wrong by two steps, which costs two.
+  double rare_gain = 0.8, rare_change_gain = 1.3;
   double widened = 1.0;  ///< standard deviations of the draws over those fitted
 
   [[nodiscard]] cairn::Proposed<cairn::SE2> operator()(const OccupancyMap& map,
@@ -76,6 +80,7 @@ struct FromMatch {
         if ((mode.share >= likely_share) == likely)
           inliers = std::max(inliers, add_peak(peaks, map, looked, mode, z));
     }
+    drop_unfounded(peaks, map.model.independence * static_cast<double>(z.size()));
     if (peaks.empty()) return cairn::FromMotion{}(map, motion, z, random);
     std::vector<double> evidence;
     for (const Peak& peak : peaks) evidence.push_back(peak.log_evidence);
@@ -116,6 +121,20 @@ private:
     cairn::OccupancyGrid::Field field;
     std::vector<cairn::ScanPoint> few;
   };
+
+  /// Rare motions go that do not gain enough over the likely ones; the first of all is the likeliest.
+  void drop_unfounded(std::vector<Peak>& peaks, double beams) const {
+    double likely = -std::numeric_limits<double>::infinity();
+    for (const Peak& peak : peaks)
+      if (peak.mode->share >= likely_share) likely = std::max(likely, peak.log_evidence);
+    if (peaks.empty()) return;
+    const std::size_t regime = peaks.front().mode->regime;
+    std::erase_if(peaks, [&](const Peak& peak) {
+      const double gain = peak.mode->regime == regime ? rare_gain : rare_change_gain;
+      return peak.mode->share < rare_share &&
+             peak.log_evidence - std::log(peak.mode->share) < likely + gain * beams;
+    });
+  }
 
   /// Returns the share of points that the best pose of this motion explains.
   double add_peak(std::vector<Peak>& peaks, const OccupancyMap& map, Looked& looked, const Mode& mode,

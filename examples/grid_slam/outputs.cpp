@@ -321,6 +321,7 @@ std::string summary(const Results& r) {
       {"heading_rad", r.newest.mean.angle()},
       {"covariance",
        {{p(0, 0), p(0, 1), p(0, 2)}, {p(1, 0), p(1, 1), p(1, 2)}, {p(2, 0), p(2, 1), p(2, 2)}}}};
+  json["scan_delay"] = {{"scans", r.delay}, {"standard_deviation", r.delay_spread}};
   json["map"] = {{"width", r.map.image.width()},
                  {"height", r.map.image.height()},
                  {"resolution_m", r.map.cell_size},

@@ -53,6 +53,7 @@ struct Results {
   std::vector<cairn::StampedPose2> odometry, drawn, means, rematched;
   std::optional<cairn::RelationError> of_odometry, of_drawn, of_means, of_rematched;
   cairn::Gaussian<cairn::SE2> newest;
+  double delay = 0, delay_spread = 0;  ///< of scans behind odometry [scans]
   MapImage map;
   std::size_t bytes = 0;
   std::vector<std::vector<cairn::SE2>> paths;  ///< of all particles

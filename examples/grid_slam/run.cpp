@@ -43,6 +43,8 @@ Results run(Mapper& mapper, const cairn::CarmenLog& log, const std::vector<cairn
   r.means = mapper.trajectory(true);
   r.rematched = mapper.rematched();
   r.newest = mapper.belief().pose();
+  r.delay = mapper.delay().mean();
+  r.delay_spread = mapper.delay().spread();
   r.map = map_image(mapper.belief()[mapper.belief().best()].map.grid);
   r.bytes = map_bytes(mapper.belief());
   for (std::size_t i = 0; i < mapper.belief().size(); ++i) {

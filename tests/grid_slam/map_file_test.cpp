@@ -127,7 +127,7 @@ TEST_SUITE("grid_slam/map_file") {
       char bytes[8];
       std::memcpy(bytes, &values[round % 7], 8);
       for (std::size_t i = 0; i < numbers.size(); ++i) changed.put(i - at < 8 ? bytes[i - at] : numbers[i]);
-      folder.put("changed", changed.file("cairngrd", 2));
+      folder.put("changed", changed.file("cairngrd", 3));
       const std::string words = cairn_test::message_of([&] {
         Mapper loaded = Mapper::loaded(folder / "changed");
         loaded.save(folder / "again");

@@ -325,6 +325,10 @@ public:
   [[nodiscard]] std::vector<PathPose<Pose>> path(std::size_t particle) const {
     return paths_.path_to((*this)[particle].node);
   }
+  /// The last pose of that path. Until the belief changes.
+  [[nodiscard]] const PathPose<Pose>& newest(std::size_t particle) const {
+    return paths_.at((*this)[particle].node);
+  }
   /// Leaves `survivors` particles, drawn by their weights, each copied as often as the others: for what is
   /// too dear to be done to all. Returns for each particle the first of the same copies, itself or one before
   /// it.
