@@ -18,32 +18,19 @@ using cairn::Vector;
 /// The chain at a linearisation point, seen from its start: with Ad_k the adjoint of pose k + 1 there, the
 /// adjoint that carries step k to the right of pose `last` is Ad(pose_last)^-1 Ad_k, so that sums over the
 /// steps of a loop are differences of sums from the start on.
-class Linearised {
+class Linearised : public ChainCovariance {
 public:
-  Linearised(const StepChain& chain, const StepChain& moved) {
-    SE2 pose;
-    adjoints_.push_back(pose.adjoint());
-    covariance_.push_back(Matrix<3>::Zero());
-    moved_.push_back(Vector<3>::Zero());
-    for (std::size_t k = 0; k < chain.steps.size(); ++k) {
-      pose = pose * moved.steps[k];
-      adjoints_.push_back(pose.adjoint());
-      const Matrix<3>& a = adjoints_.back();
-      covariance_.push_back(covariance_.back() + a * chain.covariances[k] * a.transpose());
-      moved_.push_back(moved_.back() + a * cairn::local(chain.steps[k], moved.steps[k]));
-      inverses_.push_back(pose.inverse().adjoint());
-    }
+  Linearised(const StepChain& chain, const StepChain& moved)
+      : ChainCovariance(moved.steps, chain.covariances), moved_{Vector<3>::Zero()} {
+    for (std::size_t k = 0; k < chain.steps.size(); ++k)
+      moved_.push_back(moved_.back() + adjoint(k) * cairn::local(chain.steps[k], moved.steps[k]));
   }
-
-  /// Of steps on the right of pose k + 1, seen from the start.
-  [[nodiscard]] const Matrix<3>& adjoint(std::size_t k) const { return adjoints_[k + 1]; }
-  [[nodiscard]] const Matrix<3>& to(std::size_t last) const { return inverses_[last - 1]; }
 
   /// What the steps that both loops go over contribute to the covariance between their ends.
   [[nodiscard]] Matrix<3> shared(const Loop& a, const Loop& b) const {
     const std::size_t first = std::max(a.first, b.first), last = std::min(a.last, b.last);
     if (first >= last) return Matrix<3>::Zero();
-    return to(a.last) * (covariance_[last] - covariance_[first]) * to(b.last).transpose();
+    return to(a.last) * sum(first, last) * to(b.last).transpose();
   }
   /// How far the steps have moved the loop's end already.
   [[nodiscard]] Vector<3> moved(const Loop& loop) const {
@@ -51,7 +38,6 @@ public:
   }
 
 private:
-  std::vector<Matrix<3>> adjoints_, covariance_, inverses_;
   std::vector<Vector<3>> moved_;
 };
 
@@ -82,10 +68,22 @@ std::vector<SE2> poses_of(const StepChain& chain) {
   return poses;
 }
 
-Matrix<3> covariance_between(const StepChain& chain, std::size_t first, std::size_t last) {
-  CAIRN_EXPECTS(first < last && last <= chain.steps.size(), "covariance_between needs two poses in order");
-  const Loop loop{first, last, SE2(), Matrix<3>::Zero()};
-  return Linearised(chain, chain).shared(loop, loop);
+ChainCovariance::ChainCovariance(const std::vector<SE2>& steps, const std::vector<Matrix<3>>& covariances)
+    : sums_{Matrix<3>::Zero()} {
+  CAIRN_EXPECTS(steps.size() == covariances.size(), "ChainCovariance needs a covariance for every step");
+  SE2 pose;
+  for (std::size_t k = 0; k < steps.size(); ++k) {
+    pose = pose * steps[k];
+    adjoints_.push_back(pose.adjoint());
+    inverses_.push_back(pose.inverse().adjoint());
+    const Matrix<3>& a = adjoints_.back();
+    sums_.push_back(sums_.back() + a * covariances[k] * a.transpose());
+  }
+}
+
+Matrix<3> ChainCovariance::between(std::size_t first, std::size_t last) const {
+  CAIRN_EXPECTS(first < last && last < sums_.size(), "ChainCovariance::between needs two poses in order");
+  return to(last) * sum(first, last) * to(last).transpose();
 }
 
 std::vector<SE2> conditioned(const StepChain& chain, const std::vector<Loop>& loops,

@@ -41,9 +41,29 @@ struct StepChain {
 /// Poses of the chain, one more than steps.
 [[nodiscard]] std::vector<cairn::SE2> poses_of(const StepChain& chain);
 
-/// Covariance of pose `last` seen from pose `first`, by the steps between them, on the right of `last`.
-[[nodiscard]] cairn::Matrix<3> covariance_between(const StepChain& chain, std::size_t first,
-                                                  std::size_t last);
+/// How uncertain poses of a chain are, seen from others, as sums over its steps from the start on: O(steps)
+/// to make, O(1) to ask.
+class ChainCovariance {
+public:
+  /// `covariances` are those of the steps, each on its right; as many as steps.
+  ChainCovariance(const std::vector<cairn::SE2>& steps, const std::vector<cairn::Matrix<3>>& covariances);
+  explicit ChainCovariance(const StepChain& chain) : ChainCovariance(chain.steps, chain.covariances) {}
+
+  /// Covariance of pose `last` seen from pose `first`, by the steps between them, on the right of `last`.
+  [[nodiscard]] cairn::Matrix<3> between(std::size_t first, std::size_t last) const;
+
+  /// Of what the steps from `first` to `last` add, seen from the start.
+  [[nodiscard]] cairn::Matrix<3> sum(std::size_t first, std::size_t last) const {
+    return sums_[last] - sums_[first];
+  }
+  /// Carries what is on the right of step k to the start.
+  [[nodiscard]] const cairn::Matrix<3>& adjoint(std::size_t k) const { return adjoints_[k]; }
+  /// Carries what is seen from the start to the right of pose `last`, which is not the first.
+  [[nodiscard]] const cairn::Matrix<3>& to(std::size_t last) const { return inverses_[last - 1]; }
+
+private:
+  std::vector<cairn::Matrix<3>> adjoints_, inverses_, sums_;
+};
 
 /// The chain given the loops, each with its noise v (zeros for the most likely path). Three rounds of
 /// Gauss-Newton. The chain as it is where the loops' matrix is not positive definite.

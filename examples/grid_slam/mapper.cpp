@@ -15,6 +15,7 @@
 #include <cairn/core/parallel.hpp>
 #include <cairn/core/random.hpp>
 #include <cairn/core/statistics.hpp>
+#include <cairn/manifold/so2.hpp>
 #include <cairn/scan/correlative.hpp>
 #include <cairn/scan/match.hpp>
 
@@ -218,16 +219,18 @@ Matrix<3> Mapper::motion_noise() const {
 }
 
 cairn::Gaussian<SE2> Mapper::motion_step(bool forwards) const {
-  const std::size_t from = steps_.back().scan, to = scans_.size() - 1;
-  const double delay = delay_.mean(), spread = delay_.spread(), least = std::max(0.0, delay - spread);
-  const SE2 early = delayed_motion(scans_, from, to, delay + spread, forwards);
-  const SE2 late = delayed_motion(scans_, from, to, least, forwards);
-  Vector<3> open = cairn::local(late, early) * (spread / (delay + spread - least));
-  open.head<2>().setZero();  // where it starts and stops it is odometry's own noise that counts
+  const auto moved = [&](double delay) {
+    return delayed_motion(scans_, steps_.back().scan, scans_.size() - 1, delay, forwards);
+  };
+  const double delay = delay_.mean(), most = delay + delay_.spread(),
+               least = std::max(0.0, delay - delay_.spread());
+  const double open =
+      cairn::SO2(moved(most).angle() - moved(least).angle()).angle() * (delay_.spread() / (most - least));
   // The way is odometry's own: where it starts and stops, a delay moves it by less than its noise.
-  const cairn::Vector<2> way = delayed_motion(scans_, from, to, 0, forwards).translation();
-  const double turn = delayed_motion(scans_, from, to, delay, forwards).angle();
-  return {SE2(way(0), way(1), turn), motion_noise() + open * open.transpose()};
+  const SE2 way = moved(0);
+  Matrix<3> covariance = motion_noise();
+  covariance(2, 2) += open * open;
+  return {SE2(way.x(), way.y(), moved(delay).angle()), covariance};
 }
 
 void Mapper::learn_delay(const Matrix<3>& noise) {
@@ -248,8 +251,8 @@ void Mapper::process(const cairn::StampedScan& scan) {
       index > 0 && (scans_[index - 1].T_odom_laser.inverse() * scan.T_odom_laser).translation().norm() <
                        options_.standstill;
   const bool may_turn_back = motion_.stood && motion_.distance > 2 * options_.standstill;
-  const double far = options_.slip_distance, aside = options_.slip_aside, round = options_.slip_angle;
-  const Matrix<3> slipped = Vector<3>(far * far, aside * aside, round * round).asDiagonal();
+  const double far = options_.slip_distance, round = options_.slip_angle;
+  const Matrix<3> slipped = Vector<3>(far * far, far * far, round * round).asDiagonal();
   const auto motion = [&](const SE2& x, std::size_t regime) {
     cairn::RegimeMotion<SE2> result;
     if (first) return cairn::RegimeMotion<SE2>{{{regime, 1, {x, noise}}}};
@@ -290,18 +293,16 @@ void Mapper::look_for_loop() {
   looked_ = now;
   const auto path = belief_->path(belief_->best());
   const std::vector<SE2> poses = poses_on(path);
-  const StepChain chain = drawn_steps(path);
-  for (const std::size_t near : old_places(poses, chain)) {
-    const Matrix<3> uncertain = covariance_between(chain, near, poses.size() - 1);
-    const LoopWindow window = loop_window(uncertain);
+  const ChainCovariance uncertain(drawn_steps(path));
+  for (const std::size_t near : old_places(poses, uncertain)) {
+    const LoopWindow window = loop_window(uncertain.between(near, poses.size() - 1));
     // A wide look costs more, and one of them is enough to make the next ones narrow.
     if (!(std::floor(now / window.every) > std::floor(before / window.every))) continue;
     const std::optional<Loop> loop = measured_loop(poses, near, window);
     if (!loop) continue;
     const SE2 seen = poses[loop->first].inverse() * poses[loop->last];
     const Vector<3> error = cairn::local(seen, loop->T_first_last);
-    const cairn::Cholesky<3> root(
-        Matrix<3>(covariance_between(chain, loop->first, loop->last) + loop->covariance));
+    const cairn::Cholesky<3> root(Matrix<3>(uncertain.between(loop->first, loop->last) + loop->covariance));
     if (!root.good() || root.whiten(error).squaredNorm() > options.gate) continue;
     take_loop(*loop, error, window.every);
     return;
@@ -334,7 +335,8 @@ void Mapper::take_loop(const Loop& loop, const Vector<3>& error, double every) {
   if (far) move_paths();
 }
 
-std::vector<std::size_t> Mapper::old_places(const std::vector<SE2>& poses, const StepChain& chain) const {
+std::vector<std::size_t> Mapper::old_places(const std::vector<SE2>& poses,
+                                            const ChainCovariance& uncertain) const {
   const LoopOptions& options = options_.loops;
   struct Place {
     std::size_t pose;
@@ -355,7 +357,7 @@ std::vector<std::size_t> Mapper::old_places(const std::vector<SE2>& poses, const
   for (const bool in_sight : {true, false})  // those first, then the oldest: they tell most
     for (const Place& place : places) {
       if ((place.distance <= 0.5 * options.view) != in_sight || near.size() == options.places) continue;
-      const Matrix<3> covariance = covariance_between(chain, place.pose, poses.size() - 1);
+      const Matrix<3> covariance = uncertain.between(place.pose, poses.size() - 1);
       if (place.distance < 2 + 3 * std::sqrt(covariance(0, 0) + covariance(1, 1))) near.push_back(place.pose);
     }
   return near;

@@ -69,8 +69,7 @@ struct MapperOptions {
   double turn_back = 0.04;      ///< probability that it goes on in the other direction
   double turn_unseen = 0.002;   ///< the same where no standstill was seen
   double slip = 0.002;          ///< probability that odometry says little: a collision, a push
-  double slip_distance = 0.25;  ///< [m], standard deviation of the motion then, along
-  double slip_aside = 0.25;     ///< [m], and to the side, where wheels give way last
+  double slip_distance = 0.25;  ///< [m], standard deviation of the motion then
   double slip_angle = 0.25;     ///< [rad]
   double resample_below = 0.5;
   double evidence_share = 0.12;
@@ -166,12 +165,12 @@ private:
   void accumulate(const cairn::SE2& moved);
   void process(const cairn::StampedScan& scan);
   [[nodiscard]] cairn::Matrix<3> motion_noise() const;
-  /// Of the step to the newest scan: what the delay leaves open is a part of the covariance.
+  /// Of the step to the newest scan: what the delay leaves open of the turn is a part of the covariance.
   [[nodiscard]] cairn::Gaussian<cairn::SE2> motion_step(bool forwards) const;
   void learn_delay(const cairn::Matrix<3>& noise);
   void look_for_loop();
   [[nodiscard]] std::vector<std::size_t> old_places(const std::vector<cairn::SE2>& poses,
-                                                    const StepChain& chain) const;
+                                                    const ChainCovariance& uncertain) const;
   /// Where an old place is looked for: by how far the path between has become uncertain.
   struct LoopWindow {
     double reach, turn;  // [m], [rad] to either side

@@ -180,7 +180,7 @@ TEST_SUITE("grid_slam/loop_closing") {
                     Matrix<3>(4e-5 * Matrix<3>::Identity())};
     // The joint Gaussian of the path's end seen from pose 1, by the information form: S and R are independent
     // measurements of it.
-    const Matrix<3> prior = covariance_between(chain, 1, 5);
+    const Matrix<3> prior = ChainCovariance(chain).between(1, 5);
     const Matrix<3> posterior = (prior.inverse() + loop.covariance.inverse()).inverse();
     const Vector<3> expected = posterior * (loop.covariance.inverse() * Vector<3>(0.01, -0.01, 0.004));
     constexpr int count = 20000;
