@@ -14,6 +14,8 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/cholesky.hpp>
 
+#include "support/sparse_least_squares.hpp"
+
 namespace fastslam {
 
 namespace {
@@ -24,43 +26,33 @@ using cairn::Vector;
 
 using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
 
-/// The normal equations of the whole log at one estimate: unknowns are steps of the poses, then of the
-/// landmarks.
-class NormalEquations {
+struct Estimate {
+  std::vector<SE2> poses;
+  std::map<std::uint32_t, Vector<2>> landmarks;
+};
+
+/// The least squares problem of a whole log: unknowns are steps of the poses, then of the landmarks.
+class Problem {
 public:
-  NormalEquations(const LandmarkLog& log, BatchOptimum at) : log_(&log), at_(std::move(at)) {
-    int row = 3 * static_cast<int>(log.frames.size());
-    for (const auto& [id, place] : at_.landmarks) {
-      row_of_[id] = row;
-      row += 2;
-    }
-    gradient_ = Eigen::VectorXd::Zero(row);
-    for (std::size_t k = 0; k < log.frames.size(); ++k) {
-      add_motion(k);
-      for (const auto& sighting : log.frames[k].seen)
-        if (sighting.identity) add_sighting(k, sighting);
+  Problem(const LandmarkLog& log, const std::map<std::uint32_t, Vector<2>>& landmarks) : log_(log) {
+    rows_ = 3 * static_cast<int>(log.frames.size());
+    for (const auto& [id, place] : landmarks) {
+      row_of_[id] = rows_;
+      rows_ += 2;
     }
   }
 
-  [[nodiscard]] double cost() const { return cost_; }
-  [[nodiscard]] const BatchOptimum& at() const { return at_; }
-
-  /// The step of the damped equations (H + damping diag H) d = -g. `root` has analysed the matrix of this log
-  /// at any estimate: where it has entries is the same at all.
-  [[nodiscard]] Eigen::VectorXd step(double damping, Factor& root) const {
-    Eigen::SparseMatrix<double> h = matrix();
-    for (int i = 0; i < gradient_.size(); ++i) h.coeffRef(i, i) *= 1 + damping;
-    root.factorize(h);
-    return root.solve(-gradient_);
+  [[nodiscard]] example::NormalEquations equations_at(const Estimate& at) const {
+    example::NormalEquations equations(rows_);
+    for (std::size_t k = 0; k < log_.frames.size(); ++k) {
+      add_motion(equations, at, k);
+      for (const auto& sighting : log_.frames[k].seen)
+        if (sighting.identity) add_sighting(equations, at, k, sighting);
+    }
+    return equations;
   }
-  /// The lower triangle of H.
-  [[nodiscard]] Eigen::SparseMatrix<double> matrix() const {
-    Eigen::SparseMatrix<double> h(gradient_.size(), gradient_.size());
-    h.setFromTriplets(entries_.begin(), entries_.end());
-    return h;
-  }
-  [[nodiscard]] BatchOptimum moved(const Eigen::VectorXd& d) const {
-    BatchOptimum next = at_;
+  [[nodiscard]] Estimate moved(const Estimate& at, const Eigen::VectorXd& d) const {
+    Estimate next = at;
     for (std::size_t k = 0; k < next.poses.size(); ++k)
       next.poses[k] = cairn::retract(next.poses[k], Vector<3>(d.segment<3>(3 * static_cast<int>(k))));
     for (auto& [id, place] : next.landmarks) place += d.segment<2>(row_of_.at(id));
@@ -68,54 +60,46 @@ public:
   }
 
 private:
-  /// Adds J^T W J and J^T W e of two blocks of unknowns; only the lower triangle is kept.
+  /// Adds J^T W J and J^T W e of two blocks of unknowns.
   template <int M, int A, int B>
-  void add(const Vector<M>& e, const Matrix<M>& covariance, int a, const Matrix<M, A>& by_a, int b,
-           const Matrix<M, B>& by_b) {
+  static void add(example::NormalEquations& to, const Vector<M>& e, const Matrix<M>& covariance, int a,
+                  const Matrix<M, A>& by_a, int b, const Matrix<M, B>& by_b) {
     const cairn::Cholesky<M> root(covariance);
     if (!root.good()) cairn::raise("batch_optimum: expected covariances that are positive definite");
     const Vector<M> white = root.whiten(e);
     const Matrix<M, A> j_a = root.whiten(by_a);
     const Matrix<M, B> j_b = root.whiten(by_b);
-    cost_ += 0.5 * white.squaredNorm();
-    put(b, b, Matrix<B>(j_b.transpose() * j_b));
-    gradient_.segment<B>(b) += j_b.transpose() * white;
+    to.add_cost(0.5 * white.squaredNorm());
+    to.add_block(b, b, Matrix<B>(j_b.transpose() * j_b));
+    to.add_gradient(b, Vector<B>(j_b.transpose() * white));
     if (a < 0) return;
-    put(a, a, Matrix<A>(j_a.transpose() * j_a));
-    gradient_.segment<A>(a) += j_a.transpose() * white;
-    put(b, a, Matrix<B, A>(j_b.transpose() * j_a));
-  }
-  template <int R, int C>
-  void put(int row, int column, const Matrix<R, C>& m) {
-    for (int i = 0; i < R; ++i)
-      for (int j = 0; j < C; ++j)
-        if (row + i >= column + j) entries_.emplace_back(row + i, column + j, m(i, j));
+    to.add_block(a, a, Matrix<A>(j_a.transpose() * j_a));
+    to.add_gradient(a, Vector<A>(j_a.transpose() * white));
+    to.add_block(b, a, Matrix<B, A>(j_b.transpose() * j_a));
   }
 
-  void add_motion(std::size_t k) {
-    const SE2 before = k == 0 ? SE2() : at_.poses[k - 1];
-    const auto& moved = log_->frames[k].moved;
-    const Vector<3> e = cairn::local(before * moved.mean, at_.poses[k]);
-    const Matrix<3> by_before = -(at_.poses[k].inverse() * before).adjoint();
+  void add_motion(example::NormalEquations& to, const Estimate& at, std::size_t k) const {
+    const SE2 before = k == 0 ? SE2() : at.poses[k - 1];
+    const auto& moved = log_.frames[k].moved;
+    const Vector<3> e = cairn::local(before * moved.mean, at.poses[k]);
+    const Matrix<3> by_before = -(at.poses[k].inverse() * before).adjoint();
     const int row = 3 * static_cast<int>(k);
-    add<3, 3, 3>(e, moved.covariance, row - 3, by_before, row, Matrix<3>::Identity());
+    add<3, 3, 3>(to, e, moved.covariance, row - 3, by_before, row, Matrix<3>::Identity());
   }
 
-  void add_sighting(std::size_t k, const Map::Sighting& sighting) {
-    const SE2& x = at_.poses[k];
-    const Vector<2>& m = at_.landmarks.at(*sighting.identity);
-    const Vector<2> e = -cairn::local(log_->sensor.predict(x, m), sighting.z);
-    const Matrix<2> noise = log_->sensor.noise(x, log_->sensor.initialise(x, sighting.z));
-    add<2, 3, 2>(e, noise, 3 * static_cast<int>(k), log_->sensor.state_jacobian(x, m),
-                 row_of_.at(*sighting.identity), log_->sensor.part_jacobian(x, m));
+  void add_sighting(example::NormalEquations& to, const Estimate& at, std::size_t k,
+                    const Map::Sighting& sighting) const {
+    const SE2& x = at.poses[k];
+    const Vector<2>& m = at.landmarks.at(*sighting.identity);
+    const Vector<2> e = -cairn::local(log_.sensor.predict(x, m), sighting.z);
+    const Matrix<2> noise = log_.sensor.noise(x, log_.sensor.initialise(x, sighting.z));
+    add<2, 3, 2>(to, e, noise, 3 * static_cast<int>(k), log_.sensor.state_jacobian(x, m),
+                 row_of_.at(*sighting.identity), log_.sensor.part_jacobian(x, m));
   }
 
-  const LandmarkLog* log_;
-  BatchOptimum at_;
+  const LandmarkLog& log_;
   std::map<std::uint32_t, int> row_of_;
-  std::vector<Eigen::Triplet<double>> entries_;
-  Eigen::VectorXd gradient_;
-  double cost_ = 0;
+  int rows_ = 0;
 };
 
 }  // namespace
@@ -124,32 +108,16 @@ BatchOptimum batch_optimum(const LandmarkLog& log, const std::vector<SE2>& start
   if (start.size() != log.frames.size())
     cairn::raise("batch_optimum: expected " + std::to_string(log.frames.size()) + " poses, found " +
                  std::to_string(start.size()));
-  BatchOptimum best{start, {}, 0, 0, false};
+  Estimate first{start, {}};
   for (std::size_t k = 0; k < start.size(); ++k)
     for (const auto& sighting : log.frames[k].seen)
       if (sighting.identity)
-        best.landmarks.try_emplace(*sighting.identity, log.sensor.initialise(start[k], sighting.z));
-  NormalEquations equations(log, std::move(best));
-  Factor root;
-  root.analyzePattern(equations.matrix());
-  double damping = 1e-4;
-  int iterations = 0;
-  bool converged = false;
-  for (; iterations < 200 && !converged && damping < 1e12; ++iterations) {
-    NormalEquations next(log, equations.moved(equations.step(damping, root)));
-    if (!(next.cost() < equations.cost())) {
-      damping *= 10;
-      continue;
-    }
-    converged = equations.cost() - next.cost() < 1e-9 * equations.cost();
-    equations = std::move(next);
-    damping = std::max(1e-12, damping / 10);
-  }
-  best = equations.at();
-  best.cost = equations.cost();
-  best.iterations = iterations;
-  best.converged = converged;
-  return best;
+        first.landmarks.try_emplace(*sighting.identity, log.sensor.initialise(start[k], sighting.z));
+  const Problem problem(log, first.landmarks);
+  auto best = example::levenberg(
+      std::move(first), [&](const Estimate& at) { return problem.equations_at(at); },
+      [&](const Estimate& at, const Eigen::VectorXd& d) { return problem.moved(at, d); });
+  return {std::move(best.at.poses), std::move(best.at.landmarks), best.cost, best.iterations, best.converged};
 }
 
 BatchOptimum growing_batch_optimum(const LandmarkLog& log, std::size_t by) {
@@ -199,7 +167,8 @@ PathDensity::PathDensity(const LandmarkLog& log, BatchOptimum at) {
     equations->moved.push_back(log.frames[k].moved.mean);
     equations->residuals.push_back(cairn::local(before * equations->moved[k], equations->at.poses[k]));
   }
-  equations->h = NormalEquations(log, equations->at).matrix();
+  const BatchOptimum& optimum = equations->at;
+  equations->h = Problem(log, optimum.landmarks).equations_at({optimum.poses, optimum.landmarks}).matrix();
   equations->root.compute(equations->h);
   if (equations->root.info() != Eigen::Success || !(equations->root.vectorD().minCoeff() > 0))
     cairn::raise("PathDensity: expected a log that determines every pose");
