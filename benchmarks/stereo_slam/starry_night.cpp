@@ -12,10 +12,9 @@
 
 #include <cairn/io/text.hpp>
 
-#ifdef CAIRN_BENCH_ZLIB
+#ifdef EXAMPLES_HAVE_ZLIB
 #include <cstdint>
 #include <iostream>
-#include <map>
 #include <vector>
 
 #include <cairn/core/statistics.hpp>
@@ -49,7 +48,7 @@ struct Outcome {
   std::size_t landmarks = 0, frames = 0, located = 0, keyframes = 0, first = 0;
 };
 
-#ifdef CAIRN_BENCH_ZLIB
+#ifdef EXAMPLES_HAVE_ZLIB
 
 using cairn::Matrix;
 using cairn::SE3;
@@ -58,7 +57,7 @@ using cairn::Vector;
 constexpr std::size_t steps = 1900, dots = 20, enough_for_a_pose = 3;
 
 template <int N>
-Vector<N> column(const cairn_test::MatArray& a, std::size_t k) {
+Vector<N> column(const example::MatArray& a, std::size_t k) {
   Vector<N> v;
   for (int i = 0; i < N; ++i) v(i) = a(static_cast<std::size_t>(i), k);
   return v;
@@ -67,7 +66,7 @@ Vector<N> column(const cairn_test::MatArray& a, std::size_t k) {
 /// The record, as a camera sees it: all poses and motions are the left camera's.
 class Record {
 public:
-  explicit Record(std::map<std::string, cairn_test::MatArray> arrays) : arrays_(std::move(arrays)) {
+  explicit Record(example::MatFile arrays) : arrays_(std::move(arrays)) {
     Matrix<3> R_vehicle_camera;
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j)
@@ -115,9 +114,9 @@ public:
   cairn::StereoRig rig;
 
 private:
-  [[nodiscard]] const cairn_test::MatArray& of(const std::string& name) const { return arrays_.at(name); }
+  [[nodiscard]] const example::MatArray& of(const std::string& name) const { return arrays_[name]; }
 
-  std::map<std::string, cairn_test::MatArray> arrays_;
+  example::MatFile arrays_;
   SE3 T_vehicle_camera_;
   double sigma_ = 0;
 };
@@ -276,7 +275,7 @@ std::optional<Outcome> run() {
   const auto path = cairn_test::real_data("starry_night_stereo/dataset3.mat");
   if (!path) return std::nullopt;
   std::cout << "running starry_night_stereo" << std::endl;
-  return map_and_follow(Record(cairn_test::read_mat(*path)));
+  return map_and_follow(Record(example::MatFile(*path)));
 }
 
 #else

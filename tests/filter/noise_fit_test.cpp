@@ -15,7 +15,7 @@
 #include "filter/linear_problems.hpp"
 #include "filter/nile.hpp"
 #include "support/random.hpp"
-#ifdef CAIRN_TEST_ZLIB
+#ifdef EXAMPLES_HAVE_ZLIB
 #include "support/data.hpp"
 #include "support/mat_file.hpp"
 #endif
@@ -97,9 +97,9 @@ TEST_SUITE("noise_fit") {
     CHECK(cairn::fit_noise(record, level, flow, {.rounds = 0}).status == Status::not_converged);
   }
 
-#ifdef CAIRN_TEST_ZLIB
+#ifdef EXAMPLES_HAVE_ZLIB
   template <int R, int C>
-  Matrix<R, C> matrix(const cairn_test::MatArray& a, std::size_t first = 0) {
+  Matrix<R, C> matrix(const example::MatArray& a, std::size_t first = 0) {
     Matrix<R, C> m;
     for (int j = 0; j < C; ++j)
       for (int i = 0; i < R; ++i) m(i, j) = a.numbers.at(first + static_cast<std::size_t>(j * R + i));
@@ -110,7 +110,7 @@ TEST_SUITE("noise_fit") {
   TEST_CASE("kalman, smoother and fit_noise: MATLAB's answers for Abbeel's robot") {
     const auto path = cairn_test::real_data("filter_reference/pykalman_robot/robot.mat");
     if (!path) return;
-    auto mat = cairn_test::read_mat(*path);
+    const example::MatFile mat(*path);
     using Model = cairn::ControlledLinearModel<5, 5>;
     using Sensor = cairn::LinearSensor<2, 5>;
     Model process{matrix<5, 5>(mat["A"]), Matrix<5>::Identity(), matrix<5, 5>(mat["Q"])};

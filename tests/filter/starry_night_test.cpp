@@ -5,7 +5,6 @@
 // camera and a gyroscope carried over 20 landmarks, truth by Vicon, noise variances given.
 #include <cmath>
 #include <cstddef>
-#include <map>
 #include <string>
 #include <type_traits>
 
@@ -17,7 +16,7 @@
 #include <cairn/filter/unscented.hpp>
 #include <cairn/manifold/se3.hpp>
 
-#ifdef CAIRN_TEST_ZLIB
+#ifdef EXAMPLES_HAVE_ZLIB
 #include "support/data.hpp"
 #include "support/mat_file.hpp"
 
@@ -74,7 +73,7 @@ struct LandmarkView {
 };
 
 template <int N>
-Vector<N> column(const cairn_test::MatArray& a, std::size_t k) {
+Vector<N> column(const example::MatArray& a, std::size_t k) {
   Vector<N> v;
   for (std::size_t i = 0; i < static_cast<std::size_t>(N); ++i) v(static_cast<int>(i)) = a(i, k);
   return v;
@@ -86,8 +85,7 @@ struct Outcome {
 };
 
 template <class Filter>
-Outcome fly(std::map<std::string, cairn_test::MatArray>& mat, std::size_t first, std::size_t last,
-            const Filter& filter) {
+Outcome fly(const example::MatFile& mat, std::size_t first, std::size_t last, const Filter& filter) {
   Stereo rig;
   for (int j = 0; j < 3; ++j)
     for (int i = 0; i < 3; ++i)
@@ -150,7 +148,7 @@ TEST_SUITE("starry night") {
   TEST_CASE("extended and unscented: a stereo camera over known landmarks, on the true way") {
     const auto path = cairn_test::real_data("starry_night_stereo/dataset3.mat");
     if (!path) return;
-    auto mat = cairn_test::read_mat(*path);
+    const example::MatFile mat(*path);
     const double gate = cairn::chi_square_quantile(0.9999, 4);
     // stretches in which landmarks stay in sight; between them lie up to 4 s without any, which velocities
     // this noisy do not bridge
