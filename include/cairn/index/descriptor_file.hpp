@@ -122,7 +122,7 @@ struct DescriptorAccess {
   [[nodiscard]] static DescriptorFile parts_of(const DescriptorIndex<Points>& index) {
     DescriptorFile file;
     std::vector<std::uint8_t> code(index.dimension());
-    file.low = index.low_;
+    file.low = index.scale_.low();
     for (std::size_t c = 0; c < index.cells(); ++c) {
       const auto members = index.cells_.members_of(c);
       file.sizes.push_back(static_cast<std::uint32_t>(members.size()));
@@ -136,7 +136,7 @@ struct DescriptorAccess {
         index.cells_.get(c, i, code.data());
         codes = fnv1a(bytes_of(code), codes);
       }
-    file.header = {.unit = index.unit_,
+    file.header = {.unit = index.scale_.unit(),
                    .dimension = index.dimension(),
                    .points = index.size(),
                    .cells = index.cells(),
@@ -152,8 +152,7 @@ struct DescriptorAccess {
     DescriptorIndex<Points> index(&points, options);
     if (file.ids.empty()) return index;
     const std::size_t dim = file.low.size();
-    index.low_ = std::move(file.low);
-    index.unit_ = file.header.unit;
+    index.scale_ = ByteScale(std::move(file.low), file.header.unit);
     index.size_ = file.ids.size();
     std::vector<float> row(dim);
     std::vector<std::uint8_t> codes(room_for(index.size_, dim, "DescriptorIndex: point"));
@@ -163,7 +162,7 @@ struct DescriptorAccess {
         raise(name + ": point " + std::to_string(id) + " is none of a set of " +
               std::to_string(points.size()));
       copy_point<float>(points[id], dim, row.data(), {(name + ": point").c_str(), id});
-      index.error_ = std::max(index.error_, index.encode(row.data(), &codes[i * dim]));
+      index.error_ = std::max(index.error_, index.scale_.encode(row.data(), &codes[i * dim]));
     }
     if (fnv1a(bytes_of(codes)) != file.header.codes) raise(name + ": the points are not those of the file");
     KMeans cells;
