@@ -143,6 +143,7 @@
 #include <cairn/scan/scan.hpp>
 #include <cairn/scan/stop_grid.hpp>
 #include <cairn/simd/matrix_product.hpp>
+#include <cairn/simd/processor.hpp>
 #include <cairn/simd/registers.hpp>
 #include <cairn/simd/shuffle.hpp>
 #include <cairn/slam/keyframe_map.hpp>

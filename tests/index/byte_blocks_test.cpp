@@ -11,7 +11,7 @@
 #include <cairn/core/random.hpp>
 #include <cairn/index/detail/byte_blocks.hpp>
 
-#include "support/lane_widths.hpp"
+#include "support/processors.hpp"
 #include "support/random.hpp"
 
 namespace detail = cairn::detail;
@@ -56,7 +56,7 @@ std::size_t wrong_distances(std::size_t dim, std::size_t blocks, cairn::Random& 
 TEST_SUITE("byte_blocks") {
   TEST_CASE("distances are exact, whatever the processor offers and the number of coordinates") {
     cairn::Random random(cairn_test::seed(86));
-    cairn_test::for_each_lane_width([&] {
+    cairn_test::for_each_processor([&] {
       for (std::size_t dim = 1; dim <= 130; ++dim) CHECK(wrong_distances(dim, dim % 3 + 1, random) == 0);
       CHECK(wrong_distances(detail::most_byte_axes, 1, random) == 0);
     });

@@ -19,7 +19,7 @@
 #include "index/generators.hpp"
 #include "support/data.hpp"
 #include "support/folder.hpp"
-#include "support/lane_widths.hpp"
+#include "support/processors.hpp"
 #include "support/random.hpp"
 #include "support/violation.hpp"
 
@@ -143,7 +143,7 @@ TEST_SUITE("kd_tree") {
       const std::array query{static_cast<float>(random.uniform()), static_cast<float>(random.uniform()),
                              0.5F};
       const auto expected = tree.nearest(query, 7);
-      cairn_test::for_each_lane_width([&] { check_same_distances(tree.nearest(query, 7), expected); });
+      cairn_test::for_each_processor([&] { check_same_distances(tree.nearest(query, 7), expected); });
     }
   }
 

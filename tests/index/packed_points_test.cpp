@@ -15,7 +15,7 @@
 
 #include "index/generators.hpp"
 #include "support/folder.hpp"
-#include "support/lane_widths.hpp"
+#include "support/processors.hpp"
 #include "support/random.hpp"
 
 namespace packed_points_test {
@@ -89,7 +89,7 @@ TEST_SUITE("packed_points") {
     CHECK(differing(found, by_definition(points, queries, 64)) == 0);
     CHECK(nearest_two(packed, Rows<float>(queries, 64), 3) == found);
     CHECK(nearest_two(packed, Rows<float>(queries, 64), 100) == found);
-    cairn_test::for_each_lane_width(
+    cairn_test::for_each_processor(
         [&] { CHECK(differing(nearest_two(packed, Rows<float>(queries, 64)), found) == 0); });
   }
 

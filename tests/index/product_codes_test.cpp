@@ -12,7 +12,7 @@
 #include <cairn/core/random.hpp>
 #include <cairn/index/detail/product_codes.hpp>
 
-#include "support/lane_widths.hpp"
+#include "support/processors.hpp"
 #include "support/random.hpp"
 
 namespace detail = cairn::detail;
@@ -115,7 +115,7 @@ TEST_SUITE("product_codes") {
     const std::uint64_t seed = cairn_test::seed(91);
     CAPTURE(seed);
     cairn::Random random(seed);
-    cairn_test::for_each_lane_width([&] {
+    cairn_test::for_each_processor([&] {
       for (const std::string kind : {"normal", "uniform", "equal", "ends"})
         for (const std::size_t dim : {1U, 3U, 4U, 5U, 31U, 32U, 33U, 64U, 100U, 128U, 130U})
           for (const std::size_t count : {1U, 15U, 16U, 50U}) {

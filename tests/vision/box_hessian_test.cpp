@@ -71,7 +71,7 @@ TEST_SUITE("box_hessian") {
 
 #if defined(__x86_64__)
   TEST_CASE("hessian_row: four lanes and eight give the same bits") {
-    if (!__builtin_cpu_supports("avx2")) return;
+    if (cairn::detail::processor() < cairn::detail::Processor::avx2) return;
     const cairn::IntegralImage sums(cairn_test::noise(203, 60, 4));
     for (const int step : {1, 2})
       for (const int lobe : {1, 5, 9}) {

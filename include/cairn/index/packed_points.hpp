@@ -197,7 +197,7 @@ inline constexpr std::size_t bulk_group = 192;  ///< queries that share a pass o
 /// With the tile that fits the registers of the processor.
 inline void match_group(const PackedPoints& points, std::span<BulkQuery> queries, float* packed) {
 #if defined(__x86_64__)
-  if (lane_width() == LaneWidth::avx512) {
+  if (processor() >= Processor::avx512) {
     auto body = [&]() CAIRN_INLINED { match_group<12>(points, queries, packed); };
     return with_avx512(body);
   }

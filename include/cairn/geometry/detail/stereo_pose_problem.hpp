@@ -27,12 +27,8 @@
 #include <cairn/geometry/stereo_rig.hpp>
 #include <cairn/geometry/triangulation.hpp>
 #include <cairn/manifold/se3.hpp>
+#include <cairn/simd/processor.hpp>
 #include <cairn/version.hpp>
-
-// Where the compiler may assume AVX2 anyway, one version of the loops is enough.
-#if defined(__x86_64__) && !defined(__AVX2__)
-#define CAIRN_POSE_AVX2
-#endif
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
@@ -91,10 +87,7 @@ public:
 
   [[nodiscard]] RansacScore score(const SE3& pose, double limit) const noexcept {
     const StereoView view(pose, rig_);
-#ifdef CAIRN_POSE_AVX2
-    if (__builtin_cpu_supports("avx2")) return score_avx2(view, limit);
-#endif
-    return score_lanes(view, limit);
+    return with_avx2_lanes([&]() CAIRN_INLINED { return score_lanes(view, limit); });
   }
 
   /// Local optimisation: one step that listens to a neighbourhood wider than the gate, one within it.
@@ -172,25 +165,11 @@ private:
     }
   }
 
-#ifdef CAIRN_POSE_AVX2
-  [[gnu::target("avx2")]] RansacScore score_avx2(const StereoView& view, double limit) const noexcept {
-    return score_lanes(view, limit);
-  }
-  [[gnu::target("avx2")]] void linearise_avx2(std::span<const MatchLanes> matches, const StereoView& view,
-                                              double gate, RobustLoss loss, double loss_scale,
-                                              PoseEquations& equations) const noexcept {
-    linearise_lanes(matches, view, gate, loss, loss_scale, equations);
-  }
-#endif
-
   void linearise(std::span<const MatchLanes> matches, const SE3& pose, double gate, RobustLoss loss,
                  double loss_scale, PoseEquations& equations) const noexcept {
     const StereoView view(pose, rig_);
-#ifdef CAIRN_POSE_AVX2
-    if (__builtin_cpu_supports("avx2"))
-      return linearise_avx2(matches, view, gate, loss, loss_scale, equations);
-#endif
-    linearise_lanes(matches, view, gate, loss, loss_scale, equations);
+    with_avx2_lanes([&]()
+                        CAIRN_INLINED { linearise_lanes(matches, view, gate, loss, loss_scale, equations); });
   }
 
   [[nodiscard]] std::optional<double> newton_step(std::span<const MatchLanes> matches, SE3& pose, double gate,
@@ -234,5 +213,3 @@ private:
 };
 
 }}}  // namespace cairn::CAIRN_ABI::detail
-
-#undef CAIRN_POSE_AVX2

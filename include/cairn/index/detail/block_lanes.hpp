@@ -2,14 +2,11 @@
 // SPDX-License-Identifier: MIT
 //
 /// @file
-/// Sixteen numbers side by side (GNU vector extensions), and code compiled for the widest vectors of the
-/// processor it runs on.
+/// Sixteen numbers side by side.
 ///
 /// Leaves and wide nodes hold sixteen points or boxes, coordinate by coordinate, so that one pass of vector
-/// code answers for all of them: one AVX-512 register, two of AVX, four of SSE2 or NEON.
-/// with_widest_lanes(body) compiles body three times and picks at run time; everything that body calls must
-/// be inlined. The operations and their order are the same in each, but AVX-512 fuses multiply and add, so
-/// the last bit of a distance may differ between processors (never between runs or thread counts on one).
+/// code answers for all of them: one AVX-512 register, two of AVX, four of SSE2 or NEON, picked at run time
+/// (simd/processor.hpp).
 #pragma once
 
 #include <bit>
@@ -24,6 +21,7 @@
 #include <emmintrin.h>
 #endif
 
+#include <cairn/simd/processor.hpp>
 #include <cairn/simd/shuffle.hpp>
 #include <cairn/version.hpp>
 
@@ -120,48 +118,6 @@ template <class Real, class M>
   }
 }
 
-#if defined(__x86_64__)
-enum class LaneWidth { narrow, avx2, avx512 };
-
-/// Tests set it to compare the paths; not synchronised.
-inline LaneWidth& lane_width() noexcept {
-  static LaneWidth width = [] {
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-        __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq"))
-      return LaneWidth::avx512;
-    return __builtin_cpu_supports("avx2") ? LaneWidth::avx2 : LaneWidth::narrow;
-  }();
-  return width;
-}
-
-template <class Body>
-[[gnu::target("avx512f,avx512bw,avx512vl,avx512dq,avx2"), gnu::noinline]] void with_avx512(Body& body) {
-  body();
-}
-template <class Body>
-[[gnu::target("avx2"), gnu::noinline]] void with_avx2(Body& body) {
-  body();
-}
-
-/// Runs body() compiled for the widest vectors at hand. Mark the lambda CAIRN_INLINED.
-template <class Body>
-inline void with_widest_lanes(Body body) {
-  switch (lane_width()) {
-    case LaneWidth::avx512:
-      return with_avx512(body);
-    case LaneWidth::avx2:
-      return with_avx2(body);
-    case LaneWidth::narrow:
-      return body();
-  }
-}
-#else
-template <class Body>
-inline void with_widest_lanes(Body body) {
-  body();
-}
-#endif
-
 /// Memory on cache lines.
 template <class T>
 struct CacheLineAllocator {
@@ -188,6 +144,3 @@ template <class T>
 using AlignedVector = std::vector<T, CacheLineAllocator<T>>;
 
 }}}  // namespace cairn::CAIRN_ABI::detail
-
-/// Attribute of a lambda given to with_widest_lanes().
-#define CAIRN_INLINED __attribute__((always_inline))

@@ -97,8 +97,9 @@ struct ByteBlockRange {
   return four;
 }
 
-[[gnu::target("avx512f,avx512bw,avx512vl,avx512vnni")]] inline void byte_distances_vnni(
-    const ByteBlockRange& blocks, const ByteQuery& query, std::int32_t* distances) noexcept {
+[[CAIRN_TARGET(AVX512_VNNI)]] inline void byte_distances_vnni(const ByteBlockRange& blocks,
+                                                              const ByteQuery& query,
+                                                              std::int32_t* distances) noexcept {
   const std::uint8_t* line = blocks.codes;
   const __m512i square = _mm512_set1_epi32(query.square());
   for (std::size_t block = 0; block < blocks.count; ++block) {
@@ -124,7 +125,7 @@ struct ByteBlockRange {
 }
 
 /// Squared differences of eight points' four coordinates from the query's.
-[[nodiscard, gnu::target("avx2"), gnu::always_inline]] inline __m256i byte_squares_avx2(
+[[nodiscard, CAIRN_TARGET(AVX2), gnu::always_inline]] inline __m256i byte_squares_avx2(
     const std::uint8_t* line, const __m256i& even_from, const __m256i& odd_from) noexcept {
   const __m256i codes = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(line));
   const __m256i even = _mm256_sub_epi16(_mm256_and_si256(codes, _mm256_set1_epi16(255)), even_from);
@@ -132,8 +133,8 @@ struct ByteBlockRange {
   return _mm256_add_epi32(_mm256_madd_epi16(even, even), _mm256_madd_epi16(odd, odd));
 }
 
-[[gnu::target("avx2")]] inline void byte_distances_avx2(const ByteBlockRange& blocks, const ByteQuery& query,
-                                                        std::int32_t* distances) noexcept {
+[[CAIRN_TARGET(AVX2)]] inline void byte_distances_avx2(const ByteBlockRange& blocks, const ByteQuery& query,
+                                                       std::int32_t* distances) noexcept {
   const std::uint8_t* line = blocks.codes;
   for (std::size_t block = 0; block < blocks.count; ++block) {
     __m256i low = _mm256_setzero_si256(), high = _mm256_setzero_si256();
@@ -148,12 +149,6 @@ struct ByteBlockRange {
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(to), low);
     _mm256_storeu_si256(reinterpret_cast<__m256i*>(to + 8), high);
   }
-}
-
-/// Whether the processor multiplies and adds bytes.
-[[nodiscard]] inline bool has_byte_products() noexcept {
-  static const bool answer = __builtin_cpu_supports("avx512vnni");
-  return answer;
 }
 #endif
 
@@ -257,9 +252,8 @@ public:
     const ByteBlockRange range{codes_.data() + first * groups() * 64, constants_.data() + first * block_size,
                                groups(), count};
 #if defined(__x86_64__)
-    if (lane_width() == LaneWidth::avx512 && has_byte_products())
-      return byte_distances_vnni(range, query, distances);
-    if (lane_width() != LaneWidth::narrow) return byte_distances_avx2(range, query, distances);
+    if (processor() >= Processor::avx512_vnni) return byte_distances_vnni(range, query, distances);
+    if (processor() >= Processor::avx2) return byte_distances_avx2(range, query, distances);
 #endif
     byte_distances_plain(range, query, distances);
   }

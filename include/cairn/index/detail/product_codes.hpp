@@ -275,11 +275,11 @@ struct CodeScale {
 
 #if defined(__x86_64__)
 /// From sums of points 0, 2 ... 14 and 1, 3 ... 15.
-[[gnu::target("avx2"), gnu::always_inline]] inline void finish_estimates(const __m128i& even,
-                                                                         const __m128i& odd,
-                                                                         const std::uint8_t* numbers,
-                                                                         const CodeScale& scale,
-                                                                         float* to) noexcept {
+[[CAIRN_TARGET(AVX2), gnu::always_inline]] inline void finish_estimates(const __m128i& even,
+                                                                        const __m128i& odd,
+                                                                        const std::uint8_t* numbers,
+                                                                        const CodeScale& scale,
+                                                                        float* to) noexcept {
   const __m128i eights[] = {_mm_unpacklo_epi16(even, odd), _mm_unpackhi_epi16(even, odd)};
   for (int i = 0; i < 2; ++i) {
     const __m128i own = _mm_loadu_si128(reinterpret_cast<const __m128i*>(numbers + 16 * i));
@@ -291,8 +291,9 @@ struct CodeScale {
   }
 }
 
-[[gnu::target("avx512f,avx512bw,avx512vl,avx512dq,avx2")]] inline void code_estimates_avx512(
-    const CodeBlockRange& range, const std::uint8_t* tables, const CodeScale& scale, float* to) noexcept {
+[[CAIRN_TARGET(AVX512)]] inline void code_estimates_avx512(const CodeBlockRange& range,
+                                                           const std::uint8_t* tables, const CodeScale& scale,
+                                                           float* to) noexcept {
   const __m512i low_half = _mm512_set1_epi8(15);
   const std::uint8_t* block = range.blocks;
   for (std::size_t b = 0; b < range.count; ++b, block += range.stride(), to += block_size) {
@@ -318,9 +319,9 @@ struct CodeScale {
   }
 }
 
-[[gnu::target("avx2")]] inline void code_estimates_avx2(const CodeBlockRange& range,
-                                                        const std::uint8_t* tables, const CodeScale& scale,
-                                                        float* to) noexcept {
+[[CAIRN_TARGET(AVX2)]] inline void code_estimates_avx2(const CodeBlockRange& range,
+                                                       const std::uint8_t* tables, const CodeScale& scale,
+                                                       float* to) noexcept {
   const __m256i low_half = _mm256_set1_epi8(15);
   const auto at = [](const std::uint8_t* from) { return reinterpret_cast<const __m256i*>(from); };
   const std::uint8_t* block = range.blocks;
@@ -345,9 +346,10 @@ struct CodeScale {
 }
 
 /// As CodeBlocks::verdicts(), whose |e| begin at `missed`.
-[[gnu::target("avx512f,avx512bw,avx512vl,avx512dq,avx2")]] inline void code_verdicts_avx512(
-    const std::uint8_t* missed, float unit, const CodeBlockRange& range, const float* estimates,
-    const CodeLimits& limits, CodeVerdict* to) noexcept {
+[[CAIRN_TARGET(AVX512)]] inline void code_verdicts_avx512(const std::uint8_t* missed, float unit,
+                                                          const CodeBlockRange& range, const float* estimates,
+                                                          const CodeLimits& limits,
+                                                          CodeVerdict* to) noexcept {
   constexpr __mmask16 all = 0xffff;
   for (std::size_t b = 0; b < range.count; ++b, missed += range.stride()) {
     const __m128i whole = _mm_loadu_si128(reinterpret_cast<const __m128i*>(missed));
@@ -499,8 +501,8 @@ public:
                  float* to) const noexcept {
     const CodeBlockRange range{data_.data() + first * stride(), lines_, count};
 #if defined(__x86_64__)
-    if (lane_width() == LaneWidth::avx512) return code_estimates_avx512(range, tables.entries(), scale, to);
-    if (lane_width() == LaneWidth::avx2) return code_estimates_avx2(range, tables.entries(), scale, to);
+    if (processor() >= Processor::avx512) return code_estimates_avx512(range, tables.entries(), scale, to);
+    if (processor() >= Processor::avx2) return code_estimates_avx2(range, tables.entries(), scale, to);
 #endif
     code_estimates_plain(range, tables.entries(), scale, to);
   }
@@ -509,7 +511,7 @@ public:
                 CodeVerdict* to) const noexcept {
     const std::uint8_t* missed = &data_[missed_of(first * block_size)];
 #if defined(__x86_64__)
-    if (lane_width() == LaneWidth::avx512)
+    if (processor() >= Processor::avx512)
       return code_verdicts_avx512(missed, missed_unit_, {data_.data(), lines_, count}, estimates, limits, to);
 #endif
     with_widest_lanes([&]() CAIRN_INLINED {

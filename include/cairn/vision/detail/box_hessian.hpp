@@ -22,15 +22,16 @@
 #include <vector>
 
 #include <cairn/core/sizes.hpp>
+#include <cairn/simd/processor.hpp>
 #include <cairn/version.hpp>
 #include <cairn/vision/detail/lanes.hpp>
 #include <cairn/vision/integral_image.hpp>
 
 // GCC vectorises at -O3 only; clang always does.
 #if defined(__clang__)
-#define CAIRN_VECTORISE_FOR_AVX2 [[gnu::target("avx2")]]
+#define CAIRN_VECTORISE_FOR_AVX2 [[CAIRN_TARGET(AVX2)]]
 #else
-#define CAIRN_VECTORISE_FOR_AVX2 [[gnu::target("avx2"), gnu::optimize("O3")]]
+#define CAIRN_VECTORISE_FOR_AVX2 [[CAIRN_TARGET(AVX2), gnu::optimize("O3")]]
 #endif
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
@@ -160,18 +161,12 @@ CAIRN_VECTORISE_FOR_AVX2 inline void hessian_row_wide(const HessianTaps& taps, f
 }
 #endif
 
-#if defined(__x86_64__)
-/// Whether rows are computed eight at a time where the processor can. The outcome is the same; tests switch
-/// it off, while no other thread detects, to see that it is.
-inline bool wide_hessian_rows = __builtin_cpu_supports("avx2") != 0;
-#endif
-
 /// `count` responses into `out`, which has room for three more; `scratch` has room for 3 (count + 3). Reads
 /// up to three entries behind the last tap.
 inline void hessian_row(const HessianTaps& taps, float weight, int count, float* out,
                         std::uint32_t* scratch) noexcept {
 #if defined(__x86_64__)
-  if (wide_hessian_rows) return hessian_row_wide(taps, weight, count, out);
+  if (processor() >= Processor::avx2) return hessian_row_wide(taps, weight, count, out);
 #endif
   hessian_row_narrow(taps, weight, count, out, scratch);
 }
