@@ -77,6 +77,11 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed,
                  "of campus, noise and particles: the same gives the same results for any number of threads")
       ->check(example::whole_number(0));
+  app.add_option(
+         "--smoothings", options.smoothings,
+         "how often the best path is led to the least squares of all that was seen along it, at the "
+         "end; 0: that particle's own path and map, in which nothing seen later bends what was before")
+      ->check(example::whole_number(0, 100));
   app.add_option("--threads", options.threads, "threads")->check(example::whole_number(1, 1024));
   if (const std::optional<int> code = example::parse(app, name, argc, argv)) return *code;
   return example::exit_code_of(name, [&]() -> int {

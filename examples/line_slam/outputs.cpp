@@ -105,7 +105,10 @@ void add_maps(example::Report& page, const Results& r, const Drive& drive) {
   add_map(page, "With the true poses", "What the cameras allow.", r.exact, drive);
   add_map(page, "Along odometry", "What comes of believing the wheels.", r.odometry, drive);
   add_map(page, "By " + std::to_string(r.options.particles) + " particles",
-          "The best particle's path and its map.", r.slam, drive);
+          r.options.smoothings == 0 ? "The best particle's path and its map."
+                                    : "The best particle's path, led to the least squares of what was seen "
+                                      "along it, and the map along that.",
+          r.slam, drive);
   std::vector<std::array<float, 3>> path;
   const auto at = [](const Vector<3>& p) {
     return std::array{static_cast<float>(p(0)), static_cast<float>(p(1)), static_cast<float>(p(2))};
@@ -221,6 +224,7 @@ std::string summary(const Results& r) {
   json["drive"] = "rendered campus";
   json["seed"] = r.options.seed;
   json["particles"] = r.options.particles;
+  json["smoothings"] = r.options.smoothings;
   json["metres"] = r.drive.metres;
   json["frames"] = r.steps.size();
   json["resampled"] = std::ranges::count_if(r.steps, &StepRecord::resampled);

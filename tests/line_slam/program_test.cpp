@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <set>
 #include <string>
+#include <vector>
 
 #include <doctest/doctest.h>
 #include <nlohmann/json.hpp>
@@ -17,6 +18,8 @@
 #include <cairn/io/trajectory.hpp>
 #include <cairn/version.hpp>
 
+#include "drive.hpp"
+#include "run.hpp"
 #include "support/folder.hpp"
 #include "support/program_checks.hpp"
 
@@ -42,10 +45,10 @@ TEST_SUITE("line_slam/program") {
   TEST_CASE("line_slam: a mistake is exit code 2 and a line") {
     const cairn_test::Folder folder;
     const std::string out = " --out \"" + (folder / "out").string() + "\"";
-    cairn_test::check_mistakes(
-        [&](const std::string& mistake) { return run(mistake + out); },
-        {"--nonsense", "--particles 0", "--particles many", "--threads 0", "--seed -1", "--metres 0",
-         "--metres nan", "--detector eyes", "--quiet=perhaps", "more words"});
+    cairn_test::check_mistakes([&](const std::string& mistake) { return run(mistake + out); },
+                               {"--nonsense", "--particles 0", "--particles many", "--threads 0", "--seed -1",
+                                "--metres 0", "--metres nan", "--detector eyes", "--smoothings -1",
+                                "--smoothings some", "--quiet=perhaps", "more words"});
     CHECK_FALSE(fs::exists(folder / "out"));
     folder.put("file", "");
     CHECK(run("--out \"" + (folder / "file").string() + "\"").code == 2);
@@ -74,6 +77,43 @@ TEST_SUITE("line_slam/program") {
     CHECK(cairn::read_tum(folder / "1" / "trajectory.txt").size() == 21);
     const std::string lines = cairn::read_file(folder / "1" / "lines.csv");
     CHECK(std::count(lines.begin(), lines.end(), '\n') == 1 + summary["slam"]["lines"].get<int>());
+  }
+
+  TEST_CASE(
+      "line_slam: --smoothings 0 hands over a particle's path as it was, and the default a smoothed one") {
+    const cairn_test::Folder folder;
+    const line_slam::Drive drive = line_slam::simulated_drive({.seed = 5, .metres = 15});
+    const auto off = [&](const std::string& name, const line_slam::RunOptions& options) {
+      const auto written = cairn::read_tum(folder / name / "trajectory.txt");
+      const auto made = line_slam::run(drive, options).slam.path;
+      REQUIRE(written.size() == made.size());
+      double farthest = 0;
+      for (std::size_t k = 0; k < made.size(); ++k)
+        farthest = std::max(farthest, cairn::local(made[k], written[k].pose).norm());
+      return farthest;
+    };
+    const auto smoothings = [&](const std::string& name, const std::string& option) {
+      const Outcome outcome = run("--particles 5 --metres 15 --seed 5 --quiet" + option + " --out \"" +
+                                  (folder / name).string() + "\"");
+      CAPTURE(outcome.words);
+      REQUIRE(outcome.code == 0);
+      return nlohmann::json::parse(cairn::read_file(folder / name / "summary.json"))["smoothings"].get<int>();
+    };
+    CHECK(smoothings("raw", " --smoothings 0") == 0);
+    CHECK(smoothings("smooth", "") == line_slam::RunOptions{}.smoothings);
+    const line_slam::RunOptions raw{.particles = 5, .seed = 5, .smoothings = 0},
+        smooth{.particles = 5, .seed = 5};
+    CHECK(off("raw", raw) < 1e-5);
+    CHECK(off("smooth", smooth) < 1e-5);
+    CHECK(off("raw", smooth) > 1e-3);
+    // One of the particles' own, pose for pose.
+    const line_slam::Results r = line_slam::run(drive, raw);
+    const auto is_same = [&](const std::vector<cairn::SE3>& path) {
+      for (std::size_t k = 0; k < path.size(); ++k)
+        if (cairn::local(path[k], r.slam.path[k]).norm() != 0) return false;
+      return path.size() == r.slam.path.size();
+    };
+    CHECK(std::ranges::any_of(r.paths, is_same));
   }
 
   TEST_CASE("line_slam: segments found in the pictures make a map, or it is said that there is no detector") {
