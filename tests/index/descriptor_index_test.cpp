@@ -192,6 +192,55 @@ TEST_SUITE("descriptor_index") {
     CHECK(measured < work.distances / 10);
   }
 
+  TEST_CASE("queries beyond the range of bytes have few points measured too, and exact answers") {
+    const std::uint64_t seed = cairn_test::seed(94);
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    for (const auto codes : with_and_without_codes) {
+      const std::size_t dim = 48, count = 4000;
+      auto numbers = cairn_test::make_points<float>("uniform", count, dim, random);
+      const float low = *std::min_element(numbers.begin(), numbers.end());
+      const float high = *std::max_element(numbers.begin(), numbers.end());
+      const float step = 0.05F * (high - low);
+      const Points points(numbers, dim);
+      const Index index(points, {.codes = codes});
+      const cairn::BruteForce<float> brute(points);
+      Index::Search search;
+      std::size_t within = 0, beyond = 0;
+      for (int i = 0; i < 60; ++i) {
+        std::vector<float> query = cairn_test::make_points<float>("uniform", 1, dim, random);
+        const bool outside = i % 2 == 1;
+        if (outside)
+          for (std::size_t a = 0; a < dim; a += 3)
+            query[a] = (a % 2 == 0 ? low : high) + (a % 2 == 0 ? -step : step);
+        cairn::NearestTwo<float> two;
+        search.search(index, query, two, {.leaves = 40}, nullptr, outside ? &beyond : &within);
+        cairn::NearestTwo<float> best;
+        REQUIRE(search.search(index, query, best));
+        const auto expected = brute.nearest(query, 2);
+        CHECK(best.first() == doctest::Approx(expected[0].distance).epsilon(1e-6));
+        CHECK(best.second() == doctest::Approx(expected[1].distance).epsilon(1e-6));
+      }
+      CAPTURE(within);
+      CHECK(beyond < 3 * within);
+    }
+  }
+
+  TEST_CASE("roundings that all go one way hide no point from an exact answer") {
+    // Bytes are steps of one. Of the last two points the first one is 18 away and 16 by its bytes; the other
+    // one 16.2, and 24 by its bytes, since each of 64 coordinates is rounded away from the query's.
+    const std::size_t dim = 64;
+    std::vector<float> numbers;
+    for (const float number : {0.0F, 255.0F, 98.24F, 102.51F}) numbers.insert(numbers.end(), dim, number);
+    const Points points(numbers, dim);
+    for (const auto codes : with_and_without_codes) {
+      const Index index(points, {.codes = codes});
+      const auto nearest = index.nearest(std::vector<float>(dim, 100.49F));
+      CHECK(nearest->id == 3);
+      CHECK(nearest->distance == doctest::Approx(16.16F));
+    }
+  }
+
   TEST_CASE("bytes are their own distances: nobody is measured again, and the answers are those of floats") {
     cairn::Random random(cairn_test::seed(83));
     for (const float step : {1.0F, 0.25F}) {

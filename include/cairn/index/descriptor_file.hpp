@@ -162,7 +162,9 @@ struct DescriptorAccess {
         raise(name + ": point " + std::to_string(id) + " is none of a set of " +
               std::to_string(points.size()));
       copy_point<float>(points[id], dim, row.data(), {(name + ": point").c_str(), id});
-      index.error_ = std::max(index.error_, index.scale_.encode(row.data(), &codes[i * dim]));
+      const auto missed = index.scale_.encode(row.data(), &codes[i * dim]);
+      index.error_ = std::max(index.error_, missed.rounding);
+      index.inside_ = index.inside_ && missed.outside_squared == 0;
     }
     if (fnv1a(bytes_of(codes)) != file.header.codes) raise(name + ": the points are not those of the file");
     KMeans cells;

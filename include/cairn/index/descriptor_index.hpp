@@ -224,10 +224,12 @@ public:
       row_.resize(index.dimension());
       bytes_.resize(index.dimension());
       detail::copy_point<float>(query, row_.size(), row_.data(), {"DescriptorIndex: query", 0});
-      const float error = index.scale_.encode(row_.data(), bytes_.data());
+      const auto missed = index.scale_.encode(row_.data(), bytes_.data());
       const auto exact = [&](PointId id) { return index.reduced_distance(row_.data(), id); };
-      detail::ByteOffer offer({index.dimension(), index.scale_.unit(), error + index.error_}, exact,
-                              collector);
+      byte_doubts_.clear();
+      detail::ByteOffer offer({index.dimension(), index.scale_.unit(), missed.rounding, index.error_,
+                               index.inside_ ? missed.outside_squared : 0},
+                              exact, collector, byte_doubts_);
       Work done;
       const bool all = cells_.search(index.cells_, bytes_, budget.leaves, offer, done);
       if (work != nullptr) *work += done;
@@ -241,6 +243,7 @@ public:
   private:
     std::vector<float> row_;
     std::vector<std::uint8_t> bytes_;
+    std::vector<detail::ByteDoubt> byte_doubts_;
     detail::CellSearch cells_;
   };
 
@@ -277,8 +280,12 @@ private:
     const std::size_t dim = dimension();
     std::vector<std::uint8_t> codes(rows.size());
     float error = error_;
-    for (std::size_t i = 0; i < rows.size(); i += dim)
-      error = std::max(error, scale_.encode(&rows[i], &codes[i]));
+    bool inside = inside_;
+    for (std::size_t i = 0; i < rows.size(); i += dim) {
+      const auto missed = scale_.encode(&rows[i], &codes[i]);
+      error = std::max(error, missed.rounding);
+      inside = inside && missed.outside_squared == 0;
+    }
     if (!coded() && codes_pay(size_ + ids.size())) cells_.take_codes(options_.threads);
     cells_.number_places(ids.back());
     for (const PointId id : ids)
@@ -299,6 +306,7 @@ private:
       throw;
     }
     error_ = error;
+    inside_ = inside;
   }
 
   /// Whether a set of so many points is searched faster by codes: below, bytes are in the cache anyhow. Of 64
@@ -317,11 +325,24 @@ private:
                                  static_cast<std::size_t>(std::sqrt(static_cast<double>(size_)) / 5));
   }
 
+  /// Sixteen sums side by side.
   [[nodiscard]] float reduced_distance(const float* query, PointId id) const {
     const auto& point = (*points_)[id];
     float sum = 0;
-    for (std::size_t a = 0; a < dimension(); ++a)
-      L2::accumulate(sum, query[a] - detail::coordinate<float>(point, a), a);
+    detail::with_widest_lanes([&]() CAIRN_INLINED {
+      float sums[detail::block_size] = {};
+      std::size_t axis = 0;
+      for (; axis + detail::block_size <= dimension(); axis += detail::block_size)
+        for (std::size_t i = 0; i < detail::block_size; ++i) {
+          const float difference = query[axis + i] - detail::coordinate<float>(point, axis + i);
+          sums[i] += difference * difference;
+        }
+      for (std::size_t i = 0; axis < dimension(); ++i, ++axis) {
+        const float difference = query[axis] - detail::coordinate<float>(point, axis);
+        sums[i] += difference * difference;
+      }
+      for (std::size_t i = 0; i < detail::block_size; ++i) sum += sums[i];
+    });
     return sum;
   }
 
@@ -329,7 +350,8 @@ private:
   DescriptorIndexOptions options_;
   std::size_t size_ = 0;
   detail::ByteScale scale_;
-  float error_ = 0;  ///< how far the bytes of any point are from it at most, in bytes
+  float error_ = 0;     ///< what rounding misses of any point at most, in bytes
+  bool inside_ = true;  ///< whether all points are in the box of bytes
   detail::ByteCells cells_;
 };
 

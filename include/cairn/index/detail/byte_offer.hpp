@@ -4,13 +4,20 @@
 /// @file
 /// Between distances of bytes and a collector of points: who may be nearer than the collector's limit, by as
 /// much as the bytes are off, is offered with the exact distance; where they are exact, with their own.
+///
+/// By how much they are off is bounded by the triangle's inequality, which roundings of many coordinates
+/// never come near: theirs have all directions, and of e = |what rounding misses of query and point| a
+/// distance sees about e / sqrt(dim). Who is below the limit by four of those is measured at once; who is
+/// only possible is written down, and measured before an answer is called exact.
 #pragma once
 
+#include <algorithm>
 #include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 #include <cairn/index/collectors.hpp>
 #include <cairn/index/detail/block_lanes.hpp>
@@ -20,19 +27,31 @@ namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 /// Distances of bytes against those of points.
 struct ByteAccuracy {
   std::size_t dimension;
-  float unit;   ///< what a byte's step is worth
-  float slack;  ///< how far the bytes of query and point together may be from them, in bytes
+  float unit;             ///< what a byte's step is worth
+  float query_error;      ///< what rounding misses of the query at most, in bytes
+  float point_error;      ///< and of any point
+  float outside_squared;  ///< how far the query is from the box of bytes; 0 where points are outside too
+};
+
+/// A point that its bytes make possible, but not likely.
+struct ByteDoubt {
+  std::int32_t distance;  ///< of its bytes, squared
+  PointId id;
 };
 
 /// exact(id) is the reduced distance of a point from the query.
 template <class Exact, class C>
 class ByteOffer {
 public:
-  ByteOffer(const ByteAccuracy& accuracy, const Exact& exact, C& collector)
+  /// `doubts` is empty, and used until settle().
+  ByteOffer(const ByteAccuracy& accuracy, const Exact& exact, C& collector, std::vector<ByteDoubt>& doubts)
       : exact_(exact),
         collector_(collector),
+        doubts_(doubts),
         unit_(accuracy.unit),
-        slack_(accuracy.slack),
+        slack_(accuracy.query_error + accuracy.point_error),
+        likely_slack_(std::min(slack_, likely_slack(accuracy))),
+        outside_squared_(0.999F * accuracy.outside_squared),
         growth_(1.0001F + static_cast<float>(accuracy.dimension) * std::numeric_limits<float>::epsilon()) {
     tighten();
   }
@@ -64,15 +83,38 @@ public:
     }
   }
 
+  /// Measures whoever is still possible: then nobody who was offered is left out.
+  void settle() {
+    for (const ByteDoubt& doubt : doubts_)
+      if (doubt.distance < below_) measure(doubt.id);
+    doubts_.clear();
+  }
+
 private:
+  /// Four times what the roundings of so many coordinates usually amount to.
+  [[nodiscard]] static float likely_slack(const ByteAccuracy& accuracy) noexcept {
+    return 4 * std::sqrt((accuracy.query_error * accuracy.query_error +
+                          accuracy.point_error * accuracy.point_error) /
+                         static_cast<float>(accuracy.dimension));
+  }
+
   void point(std::int32_t bytes, PointId id) {
-    float reduced = 0;
-    if (slack_ == 0) {
-      reduced = static_cast<float>(bytes) * unit_ * unit_;
-    } else {
-      ++measured_;
-      reduced = exact_(id);
-    }
+    if (slack_ == 0)
+      offer(id, static_cast<float>(bytes) * unit_ * unit_);
+    else
+      inexact(bytes, id);
+  }
+  [[gnu::noinline]] void inexact(std::int32_t bytes, PointId id) {
+    if (bytes < likely_below_)
+      measure(id);
+    else
+      doubts_.push_back({bytes, id});
+  }
+  void measure(PointId id) {
+    ++measured_;
+    offer(id, exact_(id));
+  }
+  void offer(PointId id, float reduced) {
     if (!(reduced < static_cast<float>(collector_.limit()))) return;
     collector_.offer(id, reduced);
     tighten();
@@ -80,20 +122,29 @@ private:
 
   /// The collector's limit in the units of the bytes, and what rounding can hide.
   void tighten() {
-    const float distance = std::sqrt(static_cast<float>(collector_.limit())) / unit_;
-    reach_ = distance * growth_ + slack_;
-    const float square = reach_ * reach_ + 1;
+    const float distance = std::sqrt(static_cast<float>(collector_.limit())) / unit_ * growth_;
+    const float inside = std::sqrt(std::max(0.0F, distance * distance - outside_squared_));
+    reach_ = inside + slack_;
+    below_ = squared_up(reach_);
+    if (slack_ > 0) likely_below_ = squared_up(inside + likely_slack_);
+  }
+  [[nodiscard]] static std::int32_t squared_up(float bytes) noexcept {
+    const float square = bytes * bytes + 1;
     constexpr float most = 2147483520.0F;  // the largest float below 2^31
-    below_ = square < most ? static_cast<std::int32_t>(square) + 1 : std::numeric_limits<std::int32_t>::max();
+    return square < most ? static_cast<std::int32_t>(square) + 1 : std::numeric_limits<std::int32_t>::max();
   }
 
   const Exact& exact_;
   C& collector_;
+  std::vector<ByteDoubt>& doubts_;
   float unit_;
-  float slack_;
-  float growth_;  ///< covers the rounding of sums
+  float slack_;            ///< how far the bytes of query and point together may be from them, in bytes
+  float likely_slack_;     ///< and how far they are as a rule, at most
+  float outside_squared_;  ///< what the query being outside of the box adds, squared, at least
+  float growth_;           ///< covers the rounding of sums
   float reach_ = 0;
   std::int32_t below_ = 0;
+  std::int32_t likely_below_ = 0;
   std::size_t measured_ = 0;
 };
 

@@ -7,6 +7,11 @@
 /// A coordinate x of axis a becomes round((x - low[a]) / unit), with one unit for all axes, so that distances
 /// keep their proportions. Where all coordinates are multiples of a power of two, as those of SIFT are, the
 /// bytes are the points. Sixteen coordinates at a time, the same bits on every processor.
+///
+/// A point beyond the range of bytes is first moved to the nearest one of the box that they span. That makes
+/// no two points farther from each other (the box is convex), so a distance of bytes exceeds that of the
+/// points by what rounding does alone. From a point of the box to one that is `outside` away from it the
+/// squared distance is even longer by outside^2: both lie on the two sides of each border that was crossed.
 #pragma once
 
 #include <algorithm>
@@ -33,6 +38,12 @@ public:
   [[nodiscard]] float unit() const noexcept { return unit_; }  ///< what a byte's step is worth
   [[nodiscard]] std::size_t bytes() const noexcept { return low_.capacity() * sizeof(float); }
 
+  /// What bytes miss of a point, in bytes.
+  struct Miss {
+    float rounding = 0;  ///< how far they are from it, or from where it was moved, rounded up; 0: they are it
+    float outside_squared = 0;  ///< how far it was moved, squared
+  };
+
   /// The bytes of points, and how far any of them is from its point at most, in bytes.
   struct Encoded {
     std::vector<std::uint8_t> codes;
@@ -58,7 +69,7 @@ public:
       unit_ = unit;
       result.error = 0;
       for (std::size_t i = 0; i < rows.size(); i += dim) {
-        const float error = encode(&rows[i], &result.codes[i]);
+        const float error = encode(&rows[i], &result.codes[i]).rounding;
         if (error > 0 && unit > finest) {
           result.error = error;
           break;
@@ -70,34 +81,40 @@ public:
     return result;
   }
 
-  /// Writes the bytes of a point; returns how far they are from it, in bytes, rounded up.
-  float encode(const float* row, std::uint8_t* codes) const noexcept {
-    float sum = 0;
+  /// Writes the bytes of a point.
+  Miss encode(const float* row, std::uint8_t* codes) const noexcept {
+    float sum = 0, outside = 0;
     bool exact = true;
     with_widest_lanes([&]() CAIRN_INLINED {
-      Block<float> sums{};
-      Block<std::int32_t> misses{};
+      Misses misses{};
       std::size_t axis = 0;
       for (; axis + block_size <= dimension(); axis += block_size)
-        encode_block(row + axis, low_.data() + axis, codes + axis, sums, misses);
+        encode_block(row + axis, low_.data() + axis, codes + axis, misses);
       if (const std::size_t left = dimension() - axis; left > 0) {
         float numbers[block_size] = {}, low[block_size] = {};
         std::uint8_t bytes[block_size];
         std::copy_n(row + axis, left, numbers);
         std::copy_n(low_.data() + axis, left, low);
-        encode_block(numbers, low, bytes, sums, misses);
+        encode_block(numbers, low, bytes, misses);
         std::copy_n(bytes, left, codes + axis);
       }
-      for (std::size_t i = 0; i < block_size; ++i) sum += sums[i];
-      for (std::size_t i = 0; i < block_size; ++i) exact = exact && misses[i] == 0;
+      for (std::size_t i = 0; i < block_size; ++i) sum += misses.roundings[i];
+      for (std::size_t i = 0; i < block_size; ++i) outside += misses.outside[i];
+      for (std::size_t i = 0; i < block_size; ++i) exact = exact && misses.bits[i] == 0;
     });
-    return exact ? 0 : std::sqrt(sum) * 1.001F + 1e-3F;
+    return {exact ? 0 : std::sqrt(sum) * 1.001F + 1e-3F, outside};
   }
 
 private:
-  /// Sixteen coordinates; what is missed is not zero.
+  /// Sums of squares; bits that are not zero where bytes are not their coordinates.
+  struct Misses {
+    Block<float> roundings, outside;
+    Block<std::int32_t> bits;
+  };
+
+  /// Sixteen coordinates.
   [[gnu::always_inline]] void encode_block(const float* row, const float* low, std::uint8_t* codes,
-                                           Block<float>& sums, Block<std::int32_t>& misses) const noexcept {
+                                           Misses& misses) const noexcept {
     Block<float> numbers, from;
     load_block<float>(row, numbers);
     load_block<float>(low, from);
@@ -111,7 +128,8 @@ private:
     const auto whole = __builtin_convertvector(inside + 0.5F, Block<std::int32_t>);
     const auto code = __builtin_convertvector(whole, Block<float>);
     store_bytes(whole, codes);
-    sums += (scaled - code) * (scaled - code);
+    misses.roundings += (inside - code) * (inside - code);
+    misses.outside += (scaled - inside) * (scaled - inside);
     // A difference may be rounded to a byte's value, and the point not be there.
     // Compared by their bits, which gcc 12 does side by side; adding zero makes minus zero plus zero.
     const Block<float> there = from + code * unit_, here = numbers + zero;
@@ -120,7 +138,7 @@ private:
     std::memcpy(&bits[1], &code, sizeof(code));
     std::memcpy(&bits[2], &there, sizeof(there));
     std::memcpy(&bits[3], &here, sizeof(here));
-    misses |= (bits[0] ^ bits[1]) | (bits[2] ^ bits[3]);
+    misses.bits |= (bits[0] ^ bits[1]) | (bits[2] ^ bits[3]);
   }
 
   std::vector<float> low_;

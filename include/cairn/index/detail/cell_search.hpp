@@ -42,7 +42,10 @@ public:
     if (cells.coded()) cells.codebook().make_tables(query.data(), tables_);
     const bool all = scan_cells(cells, blocks, offer, done);
     measure_pending(cells, offer);
-    if (all) settle_doubts(cells, offer);
+    if (all) {
+      settle_doubts(cells, offer);
+      offer.settle();
+    }
     return all;
   }
 
