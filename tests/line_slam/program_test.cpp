@@ -89,7 +89,7 @@ TEST_SUITE("line_slam/program") {
       REQUIRE(written.size() == made.size());
       double farthest = 0;
       for (std::size_t k = 0; k < made.size(); ++k)
-        farthest = std::max(farthest, cairn::local(made[k], written[k].pose).norm());
+        farthest = std::max(farthest, cairn::local(made[k], written[k].T_world_body).norm());
       return farthest;
     };
     const auto smoothings = [&](const std::string& name, const std::string& option) {
