@@ -145,7 +145,6 @@
 #include <cairn/simd/matrix_product.hpp>
 #include <cairn/simd/processor.hpp>
 #include <cairn/simd/registers.hpp>
-#include <cairn/simd/shuffle.hpp>
 #include <cairn/slam/keyframe_map.hpp>
 #include <cairn/slam/keyframe_map_file.hpp>
 #include <cairn/slam/landmark_map.hpp>

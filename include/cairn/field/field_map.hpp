@@ -29,6 +29,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/field/grid.hpp>
+#include <cairn/simd/registers.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
@@ -223,7 +224,7 @@ public:
   [[nodiscard]] const FieldGrid& grid() const noexcept { return grid_; }
 
 private:
-  using Four = double __attribute__((vector_size(32)));  // GCC and clang make SSE2 or AVX of it
+  using Four = detail::Lanes<double, 4>;
 
   /// The four cubic B-splines that are not zero at t in [0, 1], and their derivatives.
   static void weights(double t, Four& b, Four& db) noexcept {

@@ -35,8 +35,8 @@ namespace detail {
 /// loads: half of the time of Eigen's rankUpdate, which is made for many columns.
 template <int K>
 void add_squares(const Matrix<dynamic, K>& a, Matrix<K>& to) {
-  using Lane = RegisterOf<double, lane_bytes<4, double>>::type;
-  constexpr int width = sizeof(Lane) / sizeof(double);
+  using Lane = RegisterFor<double, 4>;
+  constexpr int width = lane_count<double, 4>;
   constexpr Eigen::Index piece = 256;  // rows of which all columns stay in the first cache
   for (Eigen::Index first = 0; first < a.rows(); first += piece)
     for (int j = 0; j < K; j += 3)

@@ -37,8 +37,8 @@ class GaussianBatch {
 public:
   using Belief = Gaussian<Vector<N, S>>;
   static constexpr int triangle = N * (N + 1) / 2;
-  static constexpr int lanes = static_cast<int>(detail::lane_bytes<64, S> / sizeof(S));
-  using Lane = typename detail::RegisterOf<S, detail::lane_bytes<64, S>>::type;
+  static constexpr int lanes = detail::lane_count<S, 64>;
+  using Lane = detail::RegisterFor<S, 64>;
 
   /// `lanes` filters; covariance holds the lower triangle row by row.
   struct Block {

@@ -27,6 +27,7 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/symmetric_eigen.hpp>
 #include <cairn/manifold/se3.hpp>
+#include <cairn/simd/registers.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
@@ -94,7 +95,7 @@ struct AlignmentMoments {
   double target_squares = 0;             // sum w |y|^2
 };
 
-using DoublePair __attribute__((vector_size(16))) = double;
+using DoublePair = Lanes<double, 2>;
 
 [[nodiscard]] inline double sum(const DoublePair& pair) noexcept {
   return pair[0] + pair[1];

@@ -17,6 +17,7 @@
 #include <utility>
 
 #include <cairn/core/linalg.hpp>
+#include <cairn/simd/registers.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
@@ -24,7 +25,7 @@ namespace cairn { inline namespace CAIRN_ABI {
 /// W numbers of type S, float or double; W a power of two. Uninitialised by default, like S itself.
 template <class S, int W>
 struct Pack {
-  typedef S Register __attribute__((vector_size(W * sizeof(S)), may_alias));
+  using Register = detail::Lanes<S, W>;
   using Mask = decltype(Register{} < Register{});
 
   Register lanes;
@@ -95,14 +96,7 @@ inline constexpr bool is_pack<Pack<S, W>> = true;
 
 /// Lanes in the widest register of the target.
 template <class S>
-inline constexpr int pack_width =
-#if defined(__AVX512F__)
-    64 / static_cast<int>(sizeof(S));
-#elif defined(__AVX__)
-    32 / static_cast<int>(sizeof(S));
-#else
-    16 / static_cast<int>(sizeof(S));
-#endif
+inline constexpr int pack_width = lane_count<S, 64>;
 
 }  // namespace detail
 }}  // namespace cairn::CAIRN_ABI

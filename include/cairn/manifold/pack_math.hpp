@@ -40,7 +40,7 @@ struct SineCosine {
 template <int W>
 [[gnu::always_inline]] inline SineCosine<W> sine_cosine(const Pack<double, W>& x) {
   using P = Pack<double, W>;
-  typedef std::int64_t Bits __attribute__((vector_size(W * 8), may_alias));
+  using Bits = Lanes<std::int64_t, W>;
   constexpr double magic = 6755399441055744.0;  // 1.5 * 2^52: adding it rounds to whole numbers
   const P shifted = x * P(0.63661977236758134308) + P(magic);
   const P turns = shifted - P(magic);

@@ -66,8 +66,8 @@ struct ScanLikelihood {
 namespace detail {
 
 /// Four floats at once, on every target alike, so that results do not depend on the width of its registers.
-using FourFloats = LaneOfWidth<float, 4>;
-typedef std::int32_t FourInts __attribute__((vector_size(16)));
+using FourFloats = Lanes<float, 4>;
+using FourInts = Lanes<std::int32_t, 4>;
 
 /// e^x for x <= 0, to a few units in the last place; 0 far below.
 [[gnu::always_inline]] inline FourFloats exp_of_negative(FourFloats x) noexcept {

@@ -22,8 +22,8 @@ namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 template <int Width, int Columns, class S>
 [[gnu::always_inline]] inline void product_tile(const S* a, std::ptrdiff_t rows, const S* b,
                                                 std::ptrdiff_t inner, S* to) {
-  using Lane = typename RegisterOf<S, lane_bytes<8, S>>::type;
-  constexpr int lanes = static_cast<int>(sizeof(Lane) / sizeof(S));
+  using Lane = RegisterFor<S, 8>;
+  constexpr int lanes = lane_count<S, 8>;
   Lane sum[Columns][Width]{};
   for (std::ptrdiff_t k = 0; k < inner; ++k) {
     Lane of_a[Width];
@@ -41,7 +41,7 @@ template <int Width, int Columns, class S>
 template <int Columns, class S>
 [[gnu::always_inline]] inline void product_columns(const S* a, std::ptrdiff_t rows, const S* b,
                                                    std::ptrdiff_t inner, S* to) {
-  constexpr std::ptrdiff_t lanes = sizeof(typename RegisterOf<S, lane_bytes<8, S>>::type) / sizeof(S);
+  constexpr std::ptrdiff_t lanes = lane_count<S, 8>;
   std::ptrdiff_t i = 0;
   for (; i + 2 * lanes <= rows; i += 2 * lanes) product_tile<2, Columns>(a + i, rows, b, inner, to + i);
   for (; i + lanes <= rows; i += lanes) product_tile<1, Columns>(a + i, rows, b, inner, to + i);

@@ -2,13 +2,14 @@
 // SPDX-License-Identifier: MIT
 //
 /// @file
-/// The registers of the target as GNU vectors, and loops that keep arrays of them in registers.
+/// Numbers side by side as GNU vectors, the registers of the target among them, their lanes in another order,
+/// and loops that keep arrays of them in registers.
 #pragma once
 
 #include <cstddef>
+#include <type_traits>
 #include <utility>
 
-#include <cairn/simd/shuffle.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
@@ -32,40 +33,62 @@ template <int Size, class Body>
   each<Size>(0, Size, body);
 }
 
-/// Widest SIMD register of the target that N numbers can use, in bytes.
-template <int N, class S>
-inline constexpr int lane_bytes =
+/// W numbers side by side, in as many registers as the target takes for them; the number itself where there
+/// is no register of such (dual numbers, long double).
+template <class T, int W>
+struct LanesOf {
+  using type = T;
+};
+template <class T>
+inline constexpr bool has_lanes = std::is_arithmetic_v<T> && !std::is_same_v<T, long double>;
+template <class T, int W>
+  requires has_lanes<T>
+struct LanesOf<T, W> {
+  typedef T type __attribute__((vector_size(W * sizeof(T))));
+};
+/// What is wider than the target's registers goes by reference only: by value the calling convention depends
+/// on the target.
+template <class T, int W>
+using Lanes = typename LanesOf<T, W>::type;
+
+/// How many lanes the widest register of the target has that N numbers can use.
+template <class T, int N>
+inline constexpr int lane_count = !has_lanes<T> ? 1 :
 #if defined(__AVX512F__)
-    N * sizeof(S) > 32 ? 64 :
+                                  N * sizeof(T) > 32 ? 64 / sizeof(T)
+                                  :
 #endif
 #if defined(__AVX__)
-    N * sizeof(S) > 16 ? 32
-                       :
+                                  N * sizeof(T) > 16 ? 32 / sizeof(T)
+                                                     :
 #endif
-                       16;
+                                                     16 / sizeof(T);
 
-/// The register type of so many bytes; the number itself where there is none for it.
-template <class S, int Bytes>
-struct RegisterOf {
-  using type = S;
-};
-template <int Bytes>
-struct RegisterOf<double, Bytes> {
-  typedef double type __attribute__((vector_size(Bytes), may_alias));
-};
-template <int Bytes>
-struct RegisterOf<float, Bytes> {
-  typedef float type __attribute__((vector_size(Bytes), may_alias));
-};
+/// That register.
+template <class T, int N>
+using RegisterFor = Lanes<T, lane_count<T, N>>;
 
-/// W numbers in a register.
-template <class S, int W>
-using LaneOfWidth = typename RegisterOf<S, W* static_cast<int>(sizeof(S))>::type;
+/// Lane k of the result becomes lane From[k] of a and b written one after the other. The result has as many
+/// lanes as there are numbers.
+template <int... From, class Vector, class Result>
+[[gnu::always_inline]] inline void shuffle(const Vector& a, const Vector& b, Result& result) noexcept {
+#if __has_builtin(__builtin_shufflevector)
+  result = __builtin_shufflevector(a, b, From...);
+#else  // gcc 11
+  constexpr int width = static_cast<int>(sizeof(Vector) / sizeof(a[0]));
+  if constexpr (sizeof(Result) == sizeof(Vector)) {
+    using Order = decltype(a < b);  // integers as wide as the numbers
+    result = __builtin_shuffle(a, b, Order{From...});
+  } else {
+    result = Result{(From < width ? a[From % width] : b[From % width])...};
+  }
+#endif
+}
 
 /// Lane l of the result is number Pick{}(l) of a and b written one after the other.
 template <class S, int W, class Pick, class Lane>
-[[gnu::always_inline]] inline LaneOfWidth<S, W> shuffled(const Lane& a, const Lane& b) {
-  LaneOfWidth<S, W> result;
+[[gnu::always_inline]] inline Lanes<S, W> shuffled(const Lane& a, const Lane& b) {
+  Lanes<S, W> result;
   [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
     shuffle<Pick{}(static_cast<int>(I))...>(a, b, result);
   }(std::make_index_sequence<W>{});

@@ -41,8 +41,8 @@ struct PickHead {
 
 /// The first R of W lanes from memory, zero in the others.
 template <class S, int W, int R>
-[[gnu::always_inline]] inline LaneOfWidth<S, W> load_lanes(const S* from) {
-  using Lane = LaneOfWidth<S, W>;
+[[gnu::always_inline]] inline Lanes<S, W> load_lanes(const S* from) {
+  using Lane = Lanes<S, W>;
   constexpr int half = W / 2;
   if constexpr (R >= W) {
     Lane lane;
@@ -75,17 +75,17 @@ template <class S, int W, int R, class Lane>
 
 /// 0, 1, 2, ... in the lanes of a register.
 template <class S, int W>
-[[gnu::always_inline]] inline LaneOfWidth<S, W> lane_numbers() {
+[[gnu::always_inline]] inline Lanes<S, W> lane_numbers() {
   return []<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
-    return LaneOfWidth<S, W>{S(I)...};
+    return Lanes<S, W>{S(I)...};
   }(std::make_index_sequence<static_cast<std::size_t>(W)>{});
 }
 
 /// N numbers in SIMD registers. Lanes beyond N hold zero after load() and are never read.
 template <int N, class S>
 struct Column {
-  using Lane = typename RegisterOf<S, lane_bytes<N, S>>::type;
-  static constexpr int width = static_cast<int>(sizeof(Lane) / sizeof(S));
+  using Lane = RegisterFor<S, N>;
+  static constexpr int width = lane_count<S, N>;
   static constexpr int count = (N + width - 1) / width;
   Lane lanes[static_cast<std::size_t>(count)];
 

@@ -30,7 +30,7 @@ struct alignas(64) CacheLine {
 
 /// The widest register of the target, for whole lines of S.
 template <class S>
-using CacheLineLane = typename RegisterOf<S, lane_bytes<CacheLine<S>::count, S>>::type;
+using CacheLineLane = RegisterFor<S, CacheLine<S>::count>;
 
 /// Rows of numbers that begin on a line and are zero in the padding, `stride` numbers apart.
 template <class S>

@@ -279,15 +279,12 @@ template <Manifold X, int M, class H>
   return candidate.innovation;
 }
 
-/// A register of 64-bit words.
-typedef std::uint64_t Words __attribute__((vector_size(lane_bytes<8, double>)));
-
 /// Bits of Count numbers, to be told from those of others without a branch for each.
 template <class S, int Count>
   requires(std::is_same_v<S, double> || std::is_same_v<S, float>)
 class SameBits {
   using Word = std::uint64_t;
-  using Lane = Words;
+  using Lane = RegisterFor<Word, 8>;
   static constexpr std::size_t size = sizeof(S) * static_cast<std::size_t>(Count);
 
 public:

@@ -31,13 +31,13 @@
 #include <cairn/geometry/stereo_match.hpp>
 #include <cairn/geometry/stereo_rig.hpp>
 #include <cairn/manifold/se3.hpp>
+#include <cairn/simd/registers.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
-/// Four doubles: one AVX register, or two of SSE2. Passed by reference only: by value their calling
-/// convention depends on the instruction set.
-using MatchLane = double __attribute__((vector_size(32), aligned(32)));  // gcc without AVX would take 16
+/// Four doubles: one AVX register, or two of SSE2, by reference only (simd/registers.hpp).
+typedef Lanes<double, 4> MatchLane __attribute__((aligned(32)));  // gcc without AVX would take 16
 inline constexpr std::size_t match_lanes = 4;
 static_assert(sizeof(MatchLane) == 32 && alignof(MatchLane) == 32);
 

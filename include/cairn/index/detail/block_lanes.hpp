@@ -22,20 +22,16 @@
 #endif
 
 #include <cairn/simd/processor.hpp>
-#include <cairn/simd/shuffle.hpp>
+#include <cairn/simd/registers.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
 inline constexpr std::size_t block_size = 16;  ///< points in a leaf, children of a wide node
 
-/// Sixteen Ts. Pass by reference only: by value the calling convention depends on the target.
+/// Sixteen Ts. Pass by reference only (simd/registers.hpp).
 template <class T>
-struct BlockOf {
-  using Type __attribute__((vector_size(block_size * sizeof(T)))) = T;
-};
-template <class T>
-using Block = typename BlockOf<T>::Type;
+using Block = Lanes<T, static_cast<int>(block_size)>;
 
 /// The integer as wide as T: nonnegative floating point numbers compare like their bits.
 template <class T>
@@ -84,8 +80,8 @@ template <class Real>
 /// Smallest of sixteen numbers, none of them NaN.
 template <class Int>
 [[gnu::always_inline]] inline Int smallest(const Block<Int>& numbers) noexcept {
-  using Eight __attribute__((vector_size(8 * sizeof(Int)))) = Int;
-  using Four __attribute__((vector_size(4 * sizeof(Int)))) = Int;
+  using Eight = Lanes<Int, 8>;
+  using Four = Lanes<Int, 4>;
   Eight eights[2];
   std::memcpy(eights, &numbers, sizeof(numbers));
   const Eight eight = eights[0] < eights[1] ? eights[0] : eights[1];

@@ -154,22 +154,22 @@ struct ByteBlockRange {
 
 inline void byte_distances_plain(const ByteBlockRange& blocks, const ByteQuery& query,
                                  std::int32_t* distances) noexcept {
-  using SixteenBits __attribute__((vector_size(64))) = std::uint16_t;
-  using Lanes = Block<std::uint32_t>;
+  using Halves = Lanes<std::uint16_t, 2 * block_size>;
+  using Wholes = Block<std::uint32_t>;
   const std::uint8_t* line = blocks.codes;
   for (std::size_t block = 0; block < blocks.count; ++block) {
-    Lanes sums{};
+    Wholes sums{};
     for (std::size_t group = 0; group < blocks.groups; ++group, line += 64) {
       const std::uint8_t* from = query.codes() + group * lane_axes;
-      Lanes lanes;
+      Wholes lanes;
       std::memcpy(&lanes, line, sizeof(lanes));
-      const Lanes even_from = Lanes{} + (from[0] | std::uint32_t{from[2]} << 16);
-      const Lanes odd_from = Lanes{} + (from[1] | std::uint32_t{from[3]} << 16);
+      const Wholes even_from = Wholes{} + (from[0] | std::uint32_t{from[2]} << 16);
+      const Wholes odd_from = Wholes{} + (from[1] | std::uint32_t{from[3]} << 16);
       // No difference of bytes exceeds 255: its square fits 16 bits, whatever the sign that was lost.
-      const SixteenBits even = SixteenBits(lanes & 0x00ff00ffU) - SixteenBits(even_from);
-      const SixteenBits odd = SixteenBits((lanes >> 8) & 0x00ff00ffU) - SixteenBits(odd_from);
-      const Lanes even_squares = Lanes(even * even);
-      const Lanes odd_squares = Lanes(odd * odd);
+      const Halves even = Halves(lanes & 0x00ff00ffU) - Halves(even_from);
+      const Halves odd = Halves((lanes >> 8) & 0x00ff00ffU) - Halves(odd_from);
+      const Wholes even_squares = Wholes(even * even);
+      const Wholes odd_squares = Wholes(odd * odd);
       sums += (even_squares & 0xffffU) + (even_squares >> 16) + (odd_squares & 0xffffU) + (odd_squares >> 16);
     }
     std::memcpy(distances + block * block_size, &sums, sizeof(sums));

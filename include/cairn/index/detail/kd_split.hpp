@@ -52,7 +52,7 @@ template <class Record>
   auto low = begin->point;
   auto high = begin->point;
   if constexpr (sizeof(Record) == 16 && std::is_same_v<std::remove_cvref_t<decltype(low[0])>, float>) {
-    using Four __attribute__((vector_size(16))) = float;  // the number rides along as a fourth coordinate
+    using Four = Lanes<float, 4>;  // the number rides along as a fourth coordinate
     Four lows;
     std::memcpy(&lows, begin, sizeof(lows));
     Four highs = lows;

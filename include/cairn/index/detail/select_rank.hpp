@@ -96,7 +96,7 @@ struct WholeOf {
 template <class Record>
   requires(sizeof(Record) == 8 || sizeof(Record) == 16 || sizeof(Record) == 32)
 struct WholeOf<Record> {
-  using Type __attribute__((vector_size(sizeof(Record)))) = unsigned char;
+  using Type = Lanes<unsigned char, sizeof(Record)>;
 };
 
 /// Moves the records for which goes_left(record) holds to the front; returns the first of the others.

@@ -13,15 +13,15 @@
 #include <cstdint>
 #include <cstring>
 
-#include <cairn/simd/shuffle.hpp>
+#include <cairn/simd/registers.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
-using Unsigned4 __attribute__((vector_size(16))) = std::uint32_t;
-using Signed4 __attribute__((vector_size(16))) = std::int32_t;
-using Float4 __attribute__((vector_size(16))) = float;
-using Long2 __attribute__((vector_size(16))) = std::uint64_t;
+using Unsigned4 = Lanes<std::uint32_t, 4>;
+using Signed4 = Lanes<std::int32_t, 4>;
+using Float4 = Lanes<float, 4>;
+using Long2 = Lanes<std::uint64_t, 2>;
 
 /// Four numbers from anywhere; no alignment is asked for.
 template <class Vector, class Number>
@@ -42,12 +42,11 @@ template <class Vector, class Number>
 template <class Number>
 [[nodiscard, gnu::always_inline]] inline auto load_pairs(const Number* from,
                                                          const Number* also_from) noexcept {
-  using Vector __attribute__((vector_size(16))) = Number;
   static_assert(sizeof(Number) == 4);
   std::uint64_t first, second;
   std::memcpy(&first, from, sizeof first);
   std::memcpy(&second, also_from, sizeof second);
-  return reinterpret_cast<Vector>(Long2{first, second});
+  return reinterpret_cast<Lanes<Number, 4>>(Long2{first, second});
 }
 
 /// Lanes of a and b written one after the other, by their numbers.
