@@ -22,6 +22,7 @@ namespace fastslam {
 
 namespace {
 
+using cairn::Matrix;
 using cairn::SE2;
 using cairn::StampedPose2;
 using cairn::Vector;
@@ -49,7 +50,7 @@ std::vector<cairn::Association> associations_along(const LandmarkLog& log, const
   std::vector<cairn::Association> all;
   for (std::size_t k = 0; k < poses.size(); ++k) {
     const auto& seen = log.frames[k].seen;
-    all.push_back(map.likeliest(map.candidates({poses[k], cairn::Matrix<3>::Zero()}, seen)).choice);
+    all.push_back(map.likeliest(map.candidates({poses[k], Matrix<3>::Zero()}, seen)).choice);
     map.insert(poses[k], seen, all.back());
   }
   return all;
@@ -292,7 +293,7 @@ private:
       std::uint32_t parent = 0xffffffffU;
       SE2 before;
       const auto add = [&](const SE2& pose, std::uint64_t step) {
-        record.nodes.push_back({{pose, {pose, cairn::Matrix<3>::Zero()}, before, pose, step}, parent});
+        record.nodes.push_back({{pose, {pose, Matrix<3>::Zero()}, before, pose, step}, parent});
         parent = static_cast<std::uint32_t>(record.nodes.size() - 1);
         before = pose;
       };
@@ -326,6 +327,67 @@ bool redraw_is_due(const Belief& belief, const LandmarkLog& log, std::uint64_t l
   if (since < 100 && !all_named(log, belief.steps(), options.landmarks)) return false;
   return belief.effective_ancestors(last) < options.redraw_below * static_cast<double>(belief.size());
 }
+
+/// What is known of the newest pose, by the particles and, as their ancestors die out, by all that were
+/// drawn.
+///
+/// What is uncertain since before the last drawing is held by the particles' ancestors of then. A weight is
+/// as much of the chance bends of its particle's own path since then as of whether its ancestor was right, so
+/// that after some tens of frames a few ancestors are left by chance, and the spread of their descendants
+/// says next to nothing of where the truth is. So by as great a share as the effective ancestors have been
+/// lost, every pose that was drawn is taken with every motion since, as though what was seen since did not
+/// tell which was right: the moments of that mixture. And the covariance of n draws is a guess itself: the
+/// truth is spread about their mean as Student's t of n - 1, whose covariance is (n + 1)(n - 1) / (n (n - 5))
+/// of it for three numbers (A. Gelman et al., "Bayesian Data Analysis", 2013, section 3.6).
+class Spread {
+public:
+  explicit Spread(const Belief& belief) { drawn(belief); }
+
+  /// The particles are independent draws, each its own ancestor.
+  void drawn(const Belief& belief) {
+    step_ = belief.steps();
+    drawn_ = belief.pose();
+  }
+  /// Of the last drawing.
+  [[nodiscard]] std::uint64_t step() const { return step_; }
+
+  [[nodiscard]] cairn::Gaussian<SE2> pose(const Belief& belief) const {
+    const auto n = static_cast<double>(belief.size());
+    cairn::Gaussian<SE2> result = belief.pose();
+    const double lost = belief.steps() == step_ ? 0 : 1 - belief.effective_ancestors(step_) / n;
+    if (lost > 0) result = mixed(result, crossed(belief), lost);
+    if (n > 5) result.covariance *= (n + 1) * (n - 1) / (n * (n - 5));
+    return result;
+  }
+
+private:
+  /// Every pose that was drawn with every motion since.
+  [[nodiscard]] cairn::Gaussian<SE2> crossed(const Belief& belief) const {
+    cairn::Particles<SE2> motions;
+    motions.log_weights = belief.particles().log_weights;
+    const std::vector<double> weights = belief.particles().weights();
+    Matrix<3> within = Matrix<3>::Zero();
+    for (std::size_t i = 0; i < belief.size(); ++i) {
+      const auto& density = belief.newest(i).drawn_from;
+      motions.states.push_back(belief.ancestor(i, step_).pose.inverse() * density.mean);
+      within += weights[i] * density.covariance;
+    }
+    const cairn::Gaussian<SE2> motion = cairn::moments(motions);
+    const Matrix<3> back = motion.mean.inverse().adjoint();
+    return {drawn_.mean * motion.mean,
+            Matrix<3>(back * drawn_.covariance * back.transpose() + motion.covariance + within)};
+  }
+  static cairn::Gaussian<SE2> mixed(const cairn::Gaussian<SE2>& a, const cairn::Gaussian<SE2>& b,
+                                    double share_of_b) {
+    const Vector<3> apart = cairn::local(a.mean, b.mean), step = share_of_b * apart;
+    return {cairn::retract(a.mean, step),
+            cairn::symmetrised(Matrix<3>((1 - share_of_b) * a.covariance + share_of_b * b.covariance +
+                                         share_of_b * (1 - share_of_b) * apart * apart.transpose()))};
+  }
+
+  std::uint64_t step_ = 0;
+  cairn::Gaussian<SE2> drawn_{};
+};
 
 /// Weighted mean of all particles' paths, pose by pose.
 std::vector<SE2> mean_path(const Belief& belief) {
@@ -501,7 +563,7 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
   const cairn::ConditionalFilter filter{
       .resample_below = options.resample_below, .seed = options.seed, .threads = options.threads};
   const bool redraws = options.redraw_below > 0 && options.proposal == ProposalKind::landmarks;
-  std::uint64_t last_redraw = 0;
+  Spread spread(belief);
   std::vector<SE2> odometry, optimum;
   const std::size_t every = std::max<std::size_t>(1, log.frames.size() / 40);
   for (const Frame& frame : log.frames) {
@@ -510,10 +572,10 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
       cairn::raise("frame " + std::to_string(odometry.size()) + ": " + explain(did.status));
     std::optional<double> redrawn_size;
     const bool is_last = belief.steps() == log.frames.size();  // the path and map that are handed over
-    if (redraws && (is_last || redraw_is_due(belief, log, last_redraw, options))) {
+    if (redraws && (is_last || redraw_is_due(belief, log, spread.step(), options))) {
       belief = Redrawing(belief, log, options, optimum).redrawn();
       redrawn_size = belief.particles().effective_size();
-      last_redraw = belief.steps();
+      spread.drawn(belief);
     }
     odometry.push_back(odometry.empty() ? frame.moved.mean : odometry.back() * frame.moved.mean);
     r.steps.push_back({frame.time,
@@ -522,7 +584,7 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
                        redrawn_size,
                        frame.seen.size(),
                        belief[0].map.size(),
-                       belief.pose(),
+                       redraws ? spread.pose(belief) : belief.pose(),
                        {}});
     if (const StampedPose2* truth = log.start ? last_until(log.truth, frame.time) : nullptr)
       r.steps.back().nees = cairn::nees(r.steps.back().pose, log.start->inverse() * truth->pose);

@@ -206,6 +206,32 @@ TEST_SUITE("fastslam/slam") {
     CHECK(nees.mean() < 4.5);
   }
 
+  TEST_CASE("fastslam: twenty particles do not grow sure of the pose as their ancestors die out") {
+    // The truth is known; a median of chi^2 of 3 is 2.37, of twenty draws' t^2 a little more or less.
+    constexpr std::uint64_t runs = 8;
+    std::vector<double> all, late;
+    for (std::uint64_t seed = 1; seed <= runs; ++seed) {
+      const Results r = run(simulated(loop_map(), seed, 400), {.particles = 20, .seed = seed});
+      std::size_t since = 0;
+      for (const StepRecord& step : r.steps) {
+        since = step.redrawn ? 0 : since + 1;
+        all.push_back(*step.nees);
+        if (since > 25) late.push_back(*step.nees);
+      }
+    }
+    const auto median = [](std::vector<double>& values) {
+      const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+      std::nth_element(values.begin(), middle, values.end());
+      return *middle;
+    };
+    REQUIRE(late.size() > 200);
+    MESSAGE("NEES, medians: ", median(all), "; more than 25 frames after a drawing ", median(late));
+    for (std::vector<double>* nees : {&all, &late}) {
+      CHECK(median(*nees) > 1);
+      CHECK(median(*nees) < 4);
+    }
+  }
+
   TEST_CASE("fastslam: by the default the spread of a hundred particles holds the truth as EKF-SLAM's does") {
     constexpr std::size_t runs = 20, frames = 100;
     std::vector<double> particles(frames, 0), never(frames, 0), joint(frames, 0);

@@ -271,7 +271,10 @@ TEST_SUITE("filter/conditional") {
     const std::vector<double> weights = belief.particles().weights();
     for (const std::size_t step : {1U, 5U, 9U, 12U}) {
       std::map<double, double> families;  // poses are drawn: no two ancestors' are the same
-      for (std::size_t i = 0; i < belief.size(); ++i) families[belief.path(i)[step].pose(0)] += weights[i];
+      for (std::size_t i = 0; i < belief.size(); ++i) {
+        families[belief.path(i)[step].pose(0)] += weights[i];
+        CHECK(belief.ancestor(i, step).pose == belief.path(i)[step].pose);
+      }
       double squares = 0;
       for (const auto& [pose, weight] : families) squares += weight * weight;
       CHECK(belief.effective_ancestors(step) == doctest::Approx(1 / squares));

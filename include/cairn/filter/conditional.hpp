@@ -329,6 +329,13 @@ public:
   [[nodiscard]] const PathPose<Pose>& newest(std::size_t particle) const {
     return paths_.at((*this)[particle].node);
   }
+  /// The pose of that path at a step. Until the belief changes. O(steps since).
+  [[nodiscard]] const PathPose<Pose>& ancestor(std::size_t particle, std::uint64_t step) const {
+    CAIRN_EXPECTS(step <= step_, "ancestor needs a step that was");
+    std::uint32_t node = (*this)[particle].node;
+    for (std::uint64_t back = step_; back > step; --back) node = paths_.parent(node);
+    return paths_.at(node);
+  }
   /// Leaves `survivors` particles, drawn by their weights, each copied as often as the others: for what is
   /// too dear to be done to all. Returns for each particle the first of the same copies, itself or one before
   /// it.
