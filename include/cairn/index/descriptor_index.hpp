@@ -68,7 +68,8 @@ enum class DescriptorCodes {
 
 struct DescriptorIndexOptions {
   /// Mean number of points in a cell, up to a factor of 1.5. 0: sqrt(n) / 5, but at least 32, where scanning
-  /// the means costs about as much as scanning the cells.
+  /// the means costs about as much as scanning the cells; sqrt(n) / 3.5 where points have codes, which are
+  /// scanned faster than means.
   std::size_t points_in_cell = 0;
   unsigned rounds = 5;   ///< of moving the cells to their means; 0 leaves the kd-tree's
   unsigned threads = 1;  ///< of the build; the index is the same for any number (0 counts as 1)
@@ -321,8 +322,9 @@ private:
 
   [[nodiscard]] std::size_t in_cell() const noexcept {
     if (options_.points_in_cell > 0) return options_.points_in_cell;
+    const double share = coded() || codes_pay(size_) ? 3.5 : 5;
     return std::max<std::size_t>(2 * detail::block_size,
-                                 static_cast<std::size_t>(std::sqrt(static_cast<double>(size_)) / 5));
+                                 static_cast<std::size_t>(std::sqrt(static_cast<double>(size_)) / share));
   }
 
   /// Sixteen sums side by side.

@@ -76,7 +76,7 @@ public:
   [[nodiscard]] const CodeBlocks& codes() const noexcept { return codes_; }
   /// Of all places, where there are codes.
   [[nodiscard]] const ByteRows& rows() const noexcept { return rows_; }
-  /// Root mean square of (q - m).e over |q - m| |e| (product_codes.hpp).
+  /// Root mean square of (q - p).e over |q - p| |e| (product_codes.hpp).
   [[nodiscard]] float spread() const noexcept { return spread_; }
   /// Reads the bytes of point i of a cell.
   void get(std::size_t cell, std::size_t i, std::uint8_t* row) const noexcept {
@@ -211,7 +211,7 @@ private:
   void learn_codes(const RowOf& row_of, unsigned threads);
   /// What points of the index meet in the nearest cell that is not theirs.
   struct Spread {
-    float of_products = 1;     ///< root mean square of (q - m).e over |q - m| |e|
+    float of_products = 1;     ///< root mean square of (q - p).e over |q - p| |e|
     float largest_number = 1;  ///< and half as much again
     float largest_missed = 1;
   };
@@ -427,7 +427,7 @@ void ByteCells::learn_codes(const RowOf& row_of, unsigned threads) {
         for (std::size_t a = 0; a < dim_; ++a) sample.push_back(static_cast<float>(row[a] - mean[a]));
       }
   }
-  ProductCodebook codebook(dim_, std::move(origin), sample, threads);
+  ProductCodebook codebook(dim_, origin, sample, threads);
   CodeWriter writer(codebook);
   Spread spread = measure_spread(codebook, row_of);
   CodeBlocks codes(codebook.groups(), blocks(), spread.largest_number, spread.largest_missed);
@@ -472,14 +472,15 @@ ByteCells::Spread ByteCells::measure_spread(const ProductCodebook& codebook, con
         std::min_element(keys.begin(), keys.begin() + static_cast<std::ptrdiff_t>(size())) - keys.begin());
     means_.get(next, writer.mean.data());
     for (std::size_t k = 0; k < extents_[next].count; ++k) {
-      writer.encode(codebook, row_of(extents_[next].place() + k, bytes.data()));
+      const std::uint8_t* other = row_of(extents_[next].place() + k, bytes.data());
+      writer.encode(codebook, other);
       spread.largest_number = std::max(spread.largest_number, 1.5F * std::abs(writer.point.number));
       spread.largest_missed = std::max(spread.largest_missed, 1.5F * writer.point.missed);
       double product = 0, square = 0;
       for (std::size_t a = 0; a < dim_; ++a) {
-        const double from_mean = point[a] - writer.mean[a];
-        product += from_mean * double{writer.missed()[a]};
-        square += from_mean * from_mean;
+        const double apart = point[a] - other[a];
+        product += apart * double{writer.missed()[codebook.place_of(a)]};
+        square += apart * apart;
       }
       const double both = square * double{writer.point.missed} * double{writer.point.missed};
       if (both > 0) sum += product * product / both;

@@ -158,10 +158,10 @@ private:
   template <class Offer>
   [[nodiscard]] CodeLimits limits_of(const ByteCells& cells, std::int32_t key,
                                      const Offer& offer) const noexcept {
-    const float proven = 2 * std::sqrt(static_cast<float>(key)) * 1.00001F + 0.001F;
+    const float below = static_cast<float>(offer.below()) * 1.000001F;
+    const float proven = 2 * std::sqrt(below) * 1.00001F;
     const float likely = std::clamp(likely_spreads * cells.spread(), 0.001F, 1.0F) * proven;
-    return {likely, proven, cells.codes().rounding(static_cast<float>(key), tables_),
-            static_cast<float>(offer.below()) * 1.000001F};
+    return {likely, proven, cells.codes().rounding(static_cast<float>(key), tables_), below};
   }
 
   void ask_for(const ByteCells& cells, std::size_t block, unsigned lanes) {
@@ -191,9 +191,9 @@ private:
   };
 
   static constexpr std::size_t at_once = 8;  ///< blocks whose estimates are made together
-  /// How many spreads an estimate may err to the one side before a point that is near is taken for far: 3.5
-  /// leave out one of some hundreds.
-  static constexpr float likely_spreads = 3.5F;
+  /// How many spreads an estimate may err to the one side before a point that is near is taken for far: 3
+  /// leave out one of a thousand.
+  static constexpr float likely_spreads = 3;
 
   ByteQuery query_;
   SmallestFirst order_;  ///< of the cells, by the distance of their means

@@ -6,24 +6,30 @@
 /// Douze, Schmid, "Product quantization for nearest neighbor search", IEEE PAMI 33, 2011; tables in
 /// registers: Andre, Kermarrec, Le Scouarnec, "Cache locality is not enough", VLDB 9, 2015).
 ///
-/// A point p of a cell with the mean m is kept as m + c, where c is the codeword that is nearest to p - m in
-/// each four coordinates; e = p - m - c is what that misses. For a query q and any origin o
+/// A point p of a cell with the mean m is kept as m + f c, where c is the codeword that is nearest to p - m
+/// in each four coordinates, and f a number of the point; e = p - m - f c is what that misses. For a query q
+/// and any origin o
 ///
-///   |q - p|^2 = |q - m|^2 - 2 (q - o).c + (|p - m|^2 + 2 (m - o).c) - 2 (q - m).e
+///   |q - p|^2 = |q - m|^2 - 2 f (q - o).c + (|p - m|^2 + 2 f (m - o).c - 2 (p - m).e) - 2 (q - p).e
 ///
 /// The first term is known from the choice of cells, the second one is a sum over sixteen-entry tables that a
 /// query makes once for all cells (that is what o is for: it makes them small), the third one is a number of
-/// the point. The last term is left out of the estimate, and |2 (q - m).e| <= 2 |q - m| |e| by Cauchy and
-/// Schwarz: with |e| kept beside the point, the estimate less that bound is below the distance, proven.
-/// Directions being many, (q - m).e is mostly far smaller: its root mean square over |q - m| |e| is measured
-/// where the codes are learnt (spread()), and a search looks first at whoever is below its limit by some of
-/// those.
+/// the point. The last term is left out of the estimate, and |2 (q - p).e| <= 2 |q - p| |e| by Cauchy and
+/// Schwarz: with |e| kept beside the point, whoever is nearer than a limit has an estimate below its square
+/// and 2 limit |e|, proven. Directions being many, (q - p).e is mostly far smaller: its root mean square over
+/// |q - p| |e| is measured where the codes are learnt (spread()), and a search looks first at whoever is
+/// below its limit by some of those. f = |p - m|^2 / (p - m).c makes e stand at right angles to p - m: else a
+/// point would be taken for nearer than it is the more of it its code misses (Gao, Long, "RaBitQ", SIGMOD
+/// 2024).
+///
+/// The four coordinates of a group are no neighbours: ordered by how much points vary in them they are dealt
+/// to the groups in turns, there and back, so that a codeword has about as much to tell in each.
 ///
 /// Entries of tables are whole numbers of one step, rounded down, so that sums are exact whatever the
 /// processor: M of them fall short by less than M steps, which goes half into the estimate and half into its
-/// bound. The number of a point is kept in 16 bits, its rounding goes into the bound; |e| in 8 bits, rounded
-/// up, the largest of which means that nothing is known. All this is about bytes; that bytes are not their
-/// points is the caller's to allow for.
+/// bound. The number of a point is kept in 16 bits, its rounding goes into the bound; f in 8 bits; |e| in 8
+/// bits, rounded up, the largest of which means that nothing is known. All this is about bytes; that bytes
+/// are not their points is the caller's to allow for.
 #pragma once
 
 #include <algorithm>
@@ -33,6 +39,7 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -51,6 +58,10 @@ namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 inline constexpr std::size_t codewords = 16;     ///< for each four coordinates
 inline constexpr std::size_t codes_in_line = 8;  ///< of each of sixteen points, in 64 bytes
 inline constexpr std::size_t code_line = 64;
+
+/// What a point's f is more than one by is so many of these, kept in a byte.
+inline constexpr float factor_unit = 1.0F / 128;
+inline constexpr float largest_factor = 1 + 255 * factor_unit;
 
 /// What a query asks of codes, made once for all cells.
 class CodeTables {
@@ -105,7 +116,8 @@ public:
   /// floor.
   [[nodiscard]] float rounding(float others) const noexcept {
     const auto roundings = static_cast<float>(numbers_.size() / codewords + 16);
-    return half_range() * 1.001F + roundings * std::numeric_limits<float>::epsilon() * (magnitude_ + others);
+    return largest_factor * half_range() * 1.001F +
+           roundings * std::numeric_limits<float>::epsilon() * (largest_factor * magnitude_ + others);
   }
 
 private:
@@ -124,19 +136,19 @@ public:
 
   /// Learnt from `rows`, rows of dim differences between points and the means of their cells, at least one:
   /// Lloyd's algorithm in each group. O(rows dim).
-  ProductCodebook(std::size_t dim, std::vector<float> origin, const std::vector<float>& rows,
+  ProductCodebook(std::size_t dim, const std::vector<float>& origin, const std::vector<float>& rows,
                   unsigned threads)
-      : dim_(dim), origin_(std::move(origin)), words_(groups() * lane_axes * codewords, 0.0F) {
-    origin_.resize(groups() * lane_axes, 0.0F);
-    const std::size_t real = (dim + lane_axes - 1) / lane_axes;
-    parallel_for(real, threads, [&](std::size_t begin, std::size_t end) {
+      : dim_(dim), origin_(places(), 0.0F), words_(places() * codewords, 0.0F) {
+    deal(rows);
+    for (std::size_t a = 0; a < dim; ++a) origin_[place_of_[a]] = origin[a];
+    parallel_for(groups(), threads, [&](std::size_t begin, std::size_t end) {
       for (std::size_t g = begin; g < end; ++g) learn_group(g, rows);
     });
     float squares = 0;
-    for (std::size_t axis = 0; axis < groups() * lane_axes; ++axis) {
+    for (std::size_t place = 0; place < places(); ++place) {
       float largest = 0;
       for (std::size_t k = 0; k < codewords; ++k)
-        largest = std::max(largest, std::abs(words_[axis * codewords + k]));
+        largest = std::max(largest, std::abs(words_[place * codewords + k]));
       squares += largest * largest;
     }
     longest_ = std::sqrt(squares) * 1.001F;
@@ -148,20 +160,26 @@ public:
   [[nodiscard]] std::size_t groups() const noexcept {
     return (dim_ + lane_axes * codes_in_line - 1) / (lane_axes * codes_in_line) * codes_in_line;
   }
+  /// Coordinates as the groups have them: those of group g are at places 4 g ... 4 g + 3. There may be places
+  /// of none.
+  [[nodiscard]] std::size_t places() const noexcept { return groups() * lane_axes; }
+  [[nodiscard]] std::size_t place_of(std::size_t axis) const noexcept { return place_of_[axis]; }
   [[nodiscard]] std::size_t bytes() const noexcept {
-    return (origin_.capacity() + words_.capacity()) * sizeof(float);
+    return (origin_.capacity() + words_.capacity()) * sizeof(float) +
+           (place_of_.capacity() + axis_at_.capacity()) * sizeof(std::uint32_t);
   }
 
-  /// The codeword of each group that is nearest to a difference of groups() * lane_axes numbers.
+  /// The codeword of each group that is nearest to a difference of places() numbers.
   void encode(const float* difference, std::uint8_t* codes) const noexcept {
     with_widest_lanes([&]() CAIRN_INLINED {
       for (std::size_t g = 0; g < groups(); ++g) codes[g] = nearest_word(g, difference + g * lane_axes);
     });
   }
-  /// Coordinate `axis` of the codeword `code` of its group.
-  [[nodiscard]] float word(std::size_t axis, std::uint8_t code) const noexcept {
-    return words_[axis * codewords + code];
+  /// At a place, of the codeword `code` of its group.
+  [[nodiscard]] float word(std::size_t place, std::uint8_t code) const noexcept {
+    return words_[place * codewords + code];
   }
+  /// By places.
   [[nodiscard]] const std::vector<float>& origin() const noexcept { return origin_; }
 
   /// Products -2 (q - origin).c of a query's bytes.
@@ -172,11 +190,11 @@ public:
       for (std::size_t g = 0; g < groups(); ++g) {
         Block<float> products{};
         for (std::size_t i = 0; i < lane_axes; ++i) {
-          const std::size_t axis = g * lane_axes + i;
-          const float number = axis < dim_ ? -2 * (static_cast<float>(query[axis]) - origin_[axis]) : 0.0F;
+          const std::size_t place = g * lane_axes + i, axis = axis_at_[place];
+          const float number = axis < dim_ ? -2 * (static_cast<float>(query[axis]) - origin_[place]) : 0.0F;
           squares += number * number;
           Block<float> words;
-          load_block<float>(words_.data() + axis * codewords, words);
+          load_block<float>(words_.data() + place * codewords, words);
           products += words * number;
         }
         tables.set_group(g, products);
@@ -204,12 +222,32 @@ private:
     return static_cast<std::uint8_t>(std::countr_zero(mask_below<std::int32_t>(bits, least + 1)));
   }
 
+  /// Of G groups, group g gets the coordinates that are the g-th, 2 G - 1 - g-th, 2 G + g-th, 4 G - 1 - g-th
+  /// of those that vary most.
+  void deal(const std::vector<float>& rows) {
+    std::vector<double> squares(dim_, 0.0);
+    for (std::size_t i = 0; i < rows.size(); ++i) squares[i % dim_] += double{rows[i]} * double{rows[i]};
+    std::vector<std::uint32_t> order(dim_);
+    std::iota(order.begin(), order.end(), 0U);
+    std::sort(order.begin(), order.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return squares[a] != squares[b] ? squares[a] > squares[b] : a < b;
+    });
+    place_of_.resize(dim_);
+    axis_at_.assign(places(), static_cast<std::uint32_t>(dim_));
+    for (std::size_t rank = 0; rank < dim_; ++rank) {
+      const std::size_t turn = rank / groups(), within = rank % groups();
+      const std::size_t group = turn % 2 == 0 ? within : groups() - 1 - within;
+      place_of_[order[rank]] = static_cast<std::uint32_t>(group * lane_axes + turn);
+      axis_at_[group * lane_axes + turn] = order[rank];
+    }
+  }
+
   void learn_group(std::size_t group, const std::vector<float>& rows) {
     const std::size_t count = rows.size() / dim_;
-    const std::size_t used = std::min(lane_axes, dim_ - group * lane_axes);
     std::vector<float> numbers(count * lane_axes, 0.0F);
-    for (std::size_t i = 0; i < count; ++i)
-      std::copy_n(&rows[i * dim_ + group * lane_axes], used, &numbers[i * lane_axes]);
+    for (std::size_t a = 0; a < lane_axes; ++a)
+      if (const std::size_t axis = axis_at_[group * lane_axes + a]; axis < dim_)
+        for (std::size_t i = 0; i < count; ++i) numbers[i * lane_axes + a] = rows[i * dim_ + axis];
     float* words = words_.data() + group * lane_axes * codewords;
     for (std::size_t k = 0; k < codewords; ++k)
       for (std::size_t a = 0; a < lane_axes; ++a)
@@ -232,14 +270,16 @@ private:
   }
 
   std::size_t dim_ = 0;
+  std::vector<std::uint32_t> place_of_;  ///< of each coordinate
+  std::vector<std::uint32_t> axis_at_;   ///< of each place; dim_ where there is none
   std::vector<float> origin_;
-  std::vector<float> words_;  ///< sixteen for each coordinate
+  std::vector<float> words_;  ///< sixteen for each place
   float longest_ = 0;         ///< no combination of codewords is longer
 };
 
 /// Blocks in memory, for the kernels. A block is `lines` lines of codes, then one with sixteen numbers of 16
-/// bits, sixteen |e| of 8, and nothing. In line l, byte 16 j + i holds the codes of point i for groups 8 l +
-/// j (low half) and 8 l + 4 + j.
+/// bits, sixteen |e| of 8, sixteen f of 8. In line l, byte 16 j + i holds the codes of point i for groups 8 l
+/// + j (low half) and 8 l + 4 + j.
 struct CodeBlockRange {
   const std::uint8_t* blocks;
   std::size_t lines;
@@ -266,9 +306,10 @@ struct CodeVerdict {
 /// estimates, of no point.
 inline constexpr float unknown_missed = 1e30F;
 
-/// From a sum of entries to an estimate: base + step * sum + unit * number.
+/// From a sum of entries to an estimate: base + f * (offset + step * sum) + unit * number.
 struct CodeScale {
   float base;
+  float offset;
   float step;
   float unit;
 };
@@ -283,11 +324,18 @@ struct CodeScale {
   const __m128i eights[] = {_mm_unpacklo_epi16(even, odd), _mm_unpackhi_epi16(even, odd)};
   for (int i = 0; i < 2; ++i) {
     const __m128i own = _mm_loadu_si128(reinterpret_cast<const __m128i*>(numbers + 16 * i));
-    const __m256 steps =
-        _mm256_mul_ps(_mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(eights[i])), _mm256_set1_ps(scale.step));
+    const __m128i factor = _mm_loadl_epi64(reinterpret_cast<const __m128i*>(numbers + 48 + 8 * i));
+    const __m256 sums = _mm256_add_ps(
+        _mm256_mul_ps(_mm256_cvtepi32_ps(_mm256_cvtepu16_epi32(eights[i])), _mm256_set1_ps(scale.step)),
+        _mm256_set1_ps(scale.offset));
+    const __m256 factors = _mm256_add_ps(
+        _mm256_mul_ps(_mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(factor)), _mm256_set1_ps(factor_unit)),
+        _mm256_set1_ps(1.0F));
     const __m256 others =
         _mm256_mul_ps(_mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(own)), _mm256_set1_ps(scale.unit));
-    _mm256_storeu_ps(to + 8 * i, _mm256_add_ps(_mm256_add_ps(steps, _mm256_set1_ps(scale.base)), others));
+    _mm256_storeu_ps(
+        to + 8 * i,
+        _mm256_add_ps(_mm256_add_ps(_mm256_mul_ps(sums, factors), _mm256_set1_ps(scale.base)), others));
   }
 }
 
@@ -394,18 +442,22 @@ inline void code_estimates_plain(const CodeBlockRange& range, const std::uint8_t
 #endif
     std::int16_t numbers[block_size];
     std::memcpy(numbers, block + range.lines * code_line, sizeof(numbers));
+    const std::uint8_t* factors = block + range.lines * code_line + 48;
     for (std::size_t i = 0; i < block_size; ++i) {
-      const float steps = static_cast<float>(sums[i]) * scale.step;
-      to[i] = (steps + scale.base) + static_cast<float>(numbers[i]) * scale.unit;
+      const float sum = static_cast<float>(sums[i]) * scale.step + scale.offset;
+      const float factor = static_cast<float>(factors[i]) * factor_unit + 1;
+      to[i] = (sum * factor + scale.base) + static_cast<float>(numbers[i]) * scale.unit;
     }
   }
 }
 
-/// A point as its codes, with the two numbers of the formula above.
+/// A point as its codes, with the numbers of the formula above.
 struct CodedPoint {
   std::vector<std::uint8_t> codes;
-  float number = 0;  ///< |p - m|^2 + 2 (m - o).c
-  float missed = 0;  ///< |e|, rounded up
+  std::uint8_t factor = 0;  ///< what f is more than one by, in factor_unit
+  float number = 0;         ///< |p - m|^2 + 2 f (m - o).c - 2 (p - m).e
+  float missed = 0;         ///< |e|, rounded up
+  [[nodiscard]] float f() const noexcept { return 1 + static_cast<float>(factor) * factor_unit; }
 };
 
 /// Codes points, one after the other.
@@ -413,29 +465,40 @@ class CodeWriter {
 public:
   CodeWriter() = default;
   explicit CodeWriter(const ProductCodebook& codebook)
-      : mean(codebook.dimension()), left_(codebook.groups() * lane_axes, 0.0F) {
+      : mean(codebook.dimension()), left_(codebook.places(), 0.0F) {
     point.codes.resize(codebook.groups());
   }
 
   std::vector<std::uint8_t> mean;  ///< of the cell, written by the caller
   CodedPoint point;                ///< written by encode()
-  /// What the codes miss of the point.
+  /// e, by places.
   [[nodiscard]] const std::vector<float>& missed() const noexcept { return left_; }
 
   void encode(const ProductCodebook& codebook, const std::uint8_t* row) noexcept {
-    for (std::size_t a = 0; a < mean.size(); ++a) left_[a] = static_cast<float>(row[a] - mean[a]);
-    std::fill(left_.begin() + static_cast<std::ptrdiff_t>(mean.size()), left_.end(), 0.0F);
-    codebook.encode(left_.data(), point.codes.data());
-    double number = 0, missed = 0;
-    for (std::size_t a = 0; a < left_.size(); ++a) {
-      const double whole = double{left_[a]};
-      const double word = double{codebook.word(a, point.codes[a / lane_axes])};
-      const double from_origin = (a < mean.size() ? mean[a] : 0) - double{codebook.origin()[a]};
-      number += whole * whole + 2 * from_origin * word;
-      missed += (whole - word) * (whole - word);
-      left_[a] = static_cast<float>(whole - word);
+    std::fill(left_.begin(), left_.end(), 0.0F);
+    double square = 0, own = 0, of_mean = 0, missed = 0;
+    for (std::size_t a = 0; a < mean.size(); ++a) {
+      const int difference = row[a] - mean[a];
+      left_[codebook.place_of(a)] = static_cast<float>(difference);
+      square += difference * difference;
     }
-    point.number = static_cast<float>(number);
+    codebook.encode(left_.data(), point.codes.data());
+    for (std::size_t a = 0; a < mean.size(); ++a) {
+      const std::size_t place = codebook.place_of(a);
+      const double word = double{codebook.word(place, point.codes[place / lane_axes])};
+      own += double{left_[place]} * word;
+      of_mean += (mean[a] - double{codebook.origin()[place]}) * word;
+    }
+    const double wished = own > 0 ? (square / own - 1) / double{factor_unit} : 0;
+    point.factor = static_cast<std::uint8_t>(std::clamp(wished + 0.5, 0.0, 255.0));
+    const auto f = double{point.f()};
+    for (std::size_t place = 0; place < left_.size(); ++place) {
+      const double left =
+          double{left_[place]} - f * double{codebook.word(place, point.codes[place / lane_axes])};
+      missed += left * left;
+      left_[place] = static_cast<float>(left);
+    }
+    point.number = static_cast<float>(2 * f * (of_mean + own) - square);
     point.missed = static_cast<float>(std::sqrt(missed) * 1.00001);
   }
 
@@ -477,19 +540,21 @@ public:
     const auto whole = static_cast<std::int16_t>(known ? number : 0);
     std::memcpy(&data_[number_of(place)], &whole, sizeof(whole));
     data_[missed_of(place)] = static_cast<std::uint8_t>(known ? missed : nothing_known);
+    data_[factor_of(place)] = point.factor;
   }
   void copy_from(const CodeBlocks& other, std::size_t from, std::size_t to) noexcept {
     for (std::size_t part = 0; part < 4 * lines_; ++part)
       data_[byte_of(to, part)] = other.data_[byte_of(from, part)];
     std::memcpy(&data_[number_of(to)], &other.data_[number_of(from)], sizeof(std::int16_t));
     data_[missed_of(to)] = other.data_[missed_of(from)];
+    data_[factor_of(to)] = other.data_[factor_of(from)];
   }
   void reserve(std::size_t blocks) { reserve_ahead(data_, room_for(blocks, stride(), "DescriptorIndex")); }
   /// What further blocks hold means nothing, but is set.
   void resize(std::size_t blocks) { data_.resize(blocks * stride(), 0); }
 
   [[nodiscard]] CodeScale scale(float square_from_mean, const CodeTables& tables) const noexcept {
-    return {square_from_mean + tables.offset(), tables.step(), number_unit_};
+    return {square_from_mean, tables.offset(), tables.step(), number_unit_};
   }
   /// How far rounding moves an estimate at most.
   [[nodiscard]] float rounding(float square_from_mean, const CodeTables& tables) const noexcept {
@@ -546,6 +611,9 @@ private:
   }
   [[nodiscard]] std::size_t missed_of(std::size_t place) const noexcept {
     return byte_of(place, 4 * lines_ + 2);
+  }
+  [[nodiscard]] std::size_t factor_of(std::size_t place) const noexcept {
+    return byte_of(place, 4 * lines_ + 3);
   }
 
   std::size_t lines_ = 0;
