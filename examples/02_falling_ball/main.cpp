@@ -86,7 +86,7 @@ int main(int argc, char** argv) {
   example::Lesson lesson(
       {.name = "02_falling_ball",
        .title = "02 Falling ball",
-       .sentence = "Choose Q by consistency, not by eye: the filter's own surprise says whether it is right.",
+       .sentence = "Choose Q (q: gusts expected) by consistency, not by eye: the surprise says which.",
        .steps = 200,
        .least_steps = 50,
        .mistakes = {{"first-noise", "each step has the Q of the first; pykalman #44, 2015, to PR #166, 2025"},

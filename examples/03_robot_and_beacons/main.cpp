@@ -110,8 +110,8 @@ int main(int argc, char** argv) {
   const auto runs = static_cast<double>(lesson.steps());
   lesson.verdict("NEES", nees.mean(), cairn::chi_square_mean_band(3, runs, 0.99999), "Poses at the end");
   lesson.verdict("NIS", nis.mean(), cairn::chi_square_mean_band(2, 30 * runs, 0.99999), "All sightings");
-  lesson.verdict("G less differences", check_jacobian(robot, start.mean, {1, 0.4}, dt).worst, 0, 1e-6);
-  lesson.verdict("H less differences", check_jacobian(cairn::RangeBearing{}, start.mean).worst, 0, 1e-6);
+  lesson.verdict("error of Jacobian G", check_jacobian(robot, start.mean, {1, 0.4}, dt).worst, 0, 1e-6);
+  lesson.verdict("error of Jacobian H", check_jacobian(cairn::RangeBearing{}, start.mean).worst, 0, 1e-6);
   example::PlaneFilm film{.title = "The last drive",
                           .caption = "Ellipse: where the filter says it is. Sightings end near a beacon.",
                           .x = {"x", "m"},
@@ -137,7 +137,7 @@ int main(int argc, char** argv) {
       .title = "Is z - h small?",
       .caption = "Plainly subtracted, the bearing of a beacon right behind is often a whole turn off.",
       .x = {"bearing expected, h", "rad"},
-      .y = {"z - h", "rad"},
+      .y = {"seen less expected, z - h", "rad"},
       .curves = {{"plain", Ink::wrong, column(bearings, 0), column(bearings, 1), true},
                  {"short way round", Ink::measurement, column(bearings, 0), column(bearings, 2), true}},
       .equal_scale = false});

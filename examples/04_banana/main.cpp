@@ -126,11 +126,11 @@ int main(int argc, char** argv) {
     const double y = std::exp(-s * s / 2), wave = std::exp(-2 * s * s), root = std::sqrt(lesson.steps());
     const double xx = 1.0004 * (1 - wave) / 2, yy = 1.0004 * (1 + wave) / 2 - y * y;
     const double off = 5 * std::sqrt(yy) / root, share = 7 / root;
-    lesson.verdict("extended, xx", extended.covariance(0, 0), s * s - 1e-9, s * s + 1e-9);
+    lesson.verdict("extended, variance of x", extended.covariance(0, 0), s * s - 1e-9, s * s + 1e-9);
     lesson.verdict("unscented, error of y", unscented.mean(1) - y, -1e-4, 1e-4, "Exact: exp(-s^2 / 2)");
-    lesson.verdict("unscented, yy", unscented.covariance(1, 1), 0.95 * yy, 1.05 * yy);
+    lesson.verdict("unscented, variance of y", unscented.covariance(1, 1), 0.95 * yy, 1.05 * yy);
     lesson.verdict("particles, error of y", swarm.mean(1) - y, -off, off, "5 sigma of their mean");
-    lesson.verdict("particles, xx", swarm.covariance(0, 0), xx * (1 - share), xx * (1 + share));
+    lesson.verdict("particles, variance of x", swarm.covariance(0, 0), xx * (1 - share), xx * (1 + share));
   }
   lesson.add(film);
   lesson.add(example::LinePlot{.title = "How many real drives end in the ellipse?",

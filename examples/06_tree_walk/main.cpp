@@ -80,7 +80,7 @@ double share_looked_at(std::size_t dimension, cairn::Random& random) {
 int main(int argc, char** argv) {
   example::Lesson lesson(
       {"06_tree_walk",
-       "A kd-tree: what need not be looked at",
+       "06 Tree walk: what need not be looked at",
        "Which of 200 shops is the nearest? A look at a dozen proves it.",
        200,
        20,

@@ -71,7 +71,7 @@ example::PlaneFrame drawn(std::size_t step, const std::vector<std::size_t>& size
 int main(int argc, char** argv) {
   example::Lesson lesson(
       {"07_growing_forest",
-       "A forest that grows",
+       "07 A forest that grows",
        "Adding points is adding one to a binary number.",
        500,
        64,
@@ -130,7 +130,7 @@ int main(int argc, char** argv) {
                  "the mean is " + example::readable(sums.back() / steps.back(), 5)});
   lesson.add(film);
   example::LinePlot plot{"Work so far", "", {"step"}, {"moves of points"}, steps};
-  plot.caption = "Counted. Building one tree anew at each step costs n^2 log n.";
+  plot.caption = "Counted; n: points so far. Building one tree anew at each step costs n^2 log n.";
   plot.curves = {{"forest", Ink::belief, sums},
                  {"n log^2 n", Ink::grey, bound, true},
                  {"anew each time", Ink::wrong, anew}};
@@ -138,7 +138,7 @@ int main(int argc, char** argv) {
   lesson.add(plot);
   plot.title = "Work of each step";
   plot.caption = "Every second step costs next to nothing; at powers of two one step moves all there is.";
-  plot.curves = {{"step", Ink::belief, singles}};
+  plot.curves = {{"this step", Ink::belief, singles}};
   plot.logarithmic_x = false, plot.wide = true;
   lesson.add(plot);
   lesson.csv("work", {"step", "moves", "sum", "n_log2_n", "anew"}, rows);

@@ -82,7 +82,7 @@ struct Slam {
 int main(int argc, char** argv) {
   example::Lesson lesson(
       {"10_ekf_slam",
-       "EKF-SLAM: the correlations are the map",
+       "10 EKF-SLAM: the correlations are the map",
        "Who moves one post moves them all.",
        250,
        60,

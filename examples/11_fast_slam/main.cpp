@@ -80,7 +80,7 @@ struct Map {  // of one particle
 int main(int argc, char** argv) {
   example::Lesson lesson(
       {"11_fast_slam",
-       "FastSLAM: factor what you can, pay in particles",
+       "11 FastSLAM: factor what you can, pay in particles",
        "A hundred paths, each with its own map.",
        160,
        60,
@@ -139,7 +139,7 @@ int main(int argc, char** argv) {
   lesson.csv("fast_slam", {"step", "nees", "effective_particles"}, rows);
   example::LinePlot plot{"Depletion", "", {"step"}, {"number"}, steps};
   plot.caption = "NEES, mean of 6 runs: 3 is right. Effective number of particles, first run.";
-  plot.curves = {{"NEES", Ink::wrong, nees}, {"1 / sum w^2", Ink::belief, effective}};
+  plot.curves = {{"NEES", Ink::wrong, nees}, {"effective particles", Ink::belief, effective}};
   plot.logarithmic = true;
   lesson.add(plot);
   return lesson.finish();

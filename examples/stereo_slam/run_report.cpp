@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -74,7 +75,8 @@ void add_figures(example::Report& report, const Summary& summary) {
   report.figure({"landmarks", std::to_string(summary.landmarks), "", "in the map at the end"});
   report.figure({"keyframes", std::to_string(summary.keyframes), "", "in the map at the end"});
   report.figure({"loops closed", std::to_string(summary.loops_closed), "", "places met again after long"});
-  report.figure({"inliers", readable(summary.inliers), "", "median of a frame"});
+  report.figure(
+      {"inliers", readable(summary.inliers), "", "points that agree with the pose, median of a frame"});
   if (!summary.errors) return;
   const TruthErrors& errors = *summary.errors;
   const std::string share =
@@ -249,8 +251,9 @@ example::LinePlot error_plot(const RunRecord& run, const TimeAxis& time, bool he
     return variance > 0 ? 3.0 * std::sqrt(variance) * (heading ? degrees : 1.0) : gap;
   });
   plot.caption =
-      "Distance from the truth, the first poses coinciding; dashed: three standard deviations of "
-      "the pose measured in this frame.";
+      "Distance from the truth, the first poses coinciding. 3 sigma: three standard deviations of the pose "
+      "as "
+      "the system states them; the error should stay below.";
   plot.curves = {{"error", Ink::wrong, error, false}, {"3 sigma", Ink::belief, claimed, true}};
   return plot;
 }
@@ -270,11 +273,11 @@ example::LinePlot consistency_plot(const RunRecord& run, const TimeAxis& time) {
   }
   plot.caption =
       "Error of the pose, squared, over its covariance (6 numbers): 6 on average where the covariance is "
-      "right, one frame in a thousand above the dashed line. Neighbouring frames err together.";
+      "right, one frame in a thousand above the line of 99.9 %. Neighbouring frames err together.";
   plot.curves = {
       {"NEES", Ink::belief, nees, false},
       {"expected", Ink::truth, std::vector<double>(nees.size(), 6.0), false},
-      {"0.999", Ink::wrong, std::vector<double>(nees.size(), cairn::chi_square_quantile(0.999, 6)), true}};
+      {"99.9 %", Ink::wrong, std::vector<double>(nees.size(), cairn::chi_square_quantile(0.999, 6)), true}};
   return plot;
 }
 
@@ -300,19 +303,21 @@ example::LinePlot match_plot(const RunRecord& run, const TimeAxis& time) {
     return over_frames(run, [&](const FrameRecord& frame) { return frame.*member; });
   };
   return {.title = "Points and matches",
-          .caption = "From image points to what the pose rests on.",
+          .caption =
+              "Points found in the left image; those of them that the right one shows too; those that are "
+              "landmarks of the map; and those that agree with the pose, which rests on them.",
           .x = time.axis,
           .y = {"count", ""},
           .x_values = time.values,
-          .curves = {{"points left", Ink::grey, count(&FrameRecord::points_left)},
-                     {"stereo matches", Ink::measurement, count(&FrameRecord::stereo_matches)},
-                     {"map matches", Ink::teal, count(&FrameRecord::map_matches)},
-                     {"inliers", Ink::belief, count(&FrameRecord::inliers)}}};
+          .curves = {{"in the left image", Ink::grey, count(&FrameRecord::points_left)},
+                     {"in both images", Ink::measurement, count(&FrameRecord::stereo_matches)},
+                     {"in the map", Ink::teal, count(&FrameRecord::map_matches)},
+                     {"agreeing (inliers)", Ink::belief, count(&FrameRecord::inliers)}}};
 }
 
 example::LinePlot landmark_plot(const RunRecord& run, const TimeAxis& time) {
   return {.title = "Landmarks",
-          .caption = "In the store after each frame.",
+          .caption = "Kept after each frame, however seldom they were seen.",
           .x = time.axis,
           .y = {"landmarks", ""},
           .x_values = time.values,
@@ -321,16 +326,19 @@ example::LinePlot landmark_plot(const RunRecord& run, const TimeAxis& time) {
 }
 
 example::Cloud map_cloud(const RunRecord& run) {
-  example::Cloud cloud{.title = "Landmarks and path",
-                       .caption = "The map at the end of the run.",
-                       .unit = "m",
-                       .points = {},
-                       .colourings = {{"grey level", "", {}, true},
-                                      {"sightings", "", {}},
-                                      {"age", "frames", {}},
-                                      {"sigma", "m", {}}},
-                       .curves = {},
-                       .wide = true};
+  example::Cloud cloud{
+      .title = "Landmarks and path",
+      .caption =
+          "The map at the end of the run. Sightings: in how many frames a landmark was seen; age: "
+          "how many frames ago it was first seen; sigma: how well its place is known.",
+      .unit = "m",
+      .points = {},
+      .colourings = {{"grey level", "", {}, true},
+                     {"sightings", "", {}},
+                     {"age", "frames", {}},
+                     {"sigma", "m", {}}},
+      .curves = {},
+      .wide = true};
   for (const LandmarkRecord& landmark : run.landmarks) {
     cloud.points.push_back(upright(landmark.position));
     cloud.colourings[0].values.push_back(landmark.grey);
@@ -372,8 +380,11 @@ example::Picture sample_picture(const RunRecord& run) {
 }
 
 std::string subtitle_of(const RunRecord& run, const Summary& summary) {
-  return std::to_string(summary.frames) + " frames, store " + run.store + ", " +
-         std::to_string(run.target_points) + " " + run.features + " points an image, seed " +
+  std::string features = run.features;
+  for (char& letter : features) letter = static_cast<char>(std::toupper(static_cast<unsigned char>(letter)));
+  return std::to_string(summary.frames) + " frames, up to " + std::to_string(run.target_points) + " " +
+         features + " points an image, landmarks in " +
+         (run.store == "multi" ? "a growing forest of kd-trees" : "one kd-tree built anew") + ", seed " +
          std::to_string(run.seed) + "; times are in timing.json";
 }
 

@@ -59,6 +59,22 @@ setTimeout(async () => {
 }, 1500);
 </script>)";
 
+// Keeps what is written on canvases: numbers of axes, and all of a figure that is saved.
+const char* const listener = R"(<script>
+const said = new Set();
+const write = CanvasRenderingContext2D.prototype.fillText;
+CanvasRenderingContext2D.prototype.fillText = function (text, ...where) {
+  said.add(text);
+  return write.call(this, text, ...where);
+};
+setTimeout(() => { document.documentElement.dataset.said = [...said].join('|'); }, 3500);
+</script>)";
+
+/// The page with this script before its own.
+std::string before_all(std::string page, const std::string& script) {
+  return page.insert(page.find("<main"), script);
+}
+
 /// axe-core's verdict on the page, or nothing where npm did not bring it.
 std::string judge() {
   const fs::path axe = CAIRN_AXE;
@@ -94,6 +110,23 @@ bool can_open() {
   return false;
 }
 
+/// What stands from one mark to the next other one.
+std::string between(const std::string& document, const std::string& begin, const std::string& end) {
+  const std::size_t at = document.find(begin);
+  if (at == std::string::npos) return {};
+  const std::size_t first = at + begin.size();
+  return document.substr(first, document.find(end, first) - first);
+}
+
+/// Whether the page uses a word, and whether it explains it at its end.
+bool says(const OpenedPage& opened, const std::string& word) {
+  return between(opened.document, "id=\"data\"", "</script>").find(word) != std::string::npos;
+}
+bool explains(const OpenedPage& opened, const std::string& word) {
+  return between(opened.document, "class=\"words\"", "</section>").find("<dt>" + word + "</dt>") !=
+         std::string::npos;
+}
+
 std::vector<std::string> lessons() {
   std::istringstream list(CAIRN_LESSONS);
   std::vector<std::string> names;
@@ -121,6 +154,7 @@ void check_opens(const std::string& lesson) {
   CHECK(opened.has("data-panels="));
   CHECK(opened.has("class=\"figure good\""));
   CHECK_FALSE(opened.has("class=\"empty\""));
+  CHECK(says(opened, "NEES") == explains(opened, "NEES"));
   check_sliders_move(opened);
   check_accessible(opened);
 }
@@ -167,6 +201,51 @@ TEST_CASE(
   CHECK(opened.count("href=\"#figure-") == 6);
   check_sliders_move(opened);
   check_accessible(opened);
+}
+
+TEST_CASE("report page: words that it uses are explained at its end, and others are not") {
+  if (!can_open()) return;
+  example::Report report("words", "");
+  report.figure({"ATE", "1", "m", "first", example::KeyFigure::Verdict::good});
+  report.add(example::LinePlot{.title = "NIS", .x_values = {0, 1}, .curves = {{"one", Ink::belief, {1, 2}}}});
+  const cairn_test::Folder folder;
+  cairn::write_file_atomically(folder / "page.html", report.html().value());
+  const OpenedPage opened = cairn_test::open_page(folder, folder / "page.html");
+  CHECK(opened.console == "");
+  CHECK(explains(opened, "ATE"));
+  CHECK(explains(opened, "NIS"));
+  CHECK_FALSE(explains(opened, "NEES"));
+}
+
+TEST_CASE(
+    "report page: a logarithmic axis does not begin at a rounding error, small numbers are short, the legend "
+    "shows lines as they are drawn and goes into the file that is saved") {
+  if (!can_open()) return;
+  example::LinePlot plot{.title = "errors", .curves = {{"first", Ink::wrong, {}}, {"second", Ink::teal, {}}}};
+  for (int i = 0; i < 200; ++i) {
+    plot.x_values.push_back(i);
+    plot.curves[0].values.push_back(i == 0 ? 1e-14 : 0.1 + i);
+    plot.curves[1].values.push_back(0.2 + i);
+  }
+  plot.logarithmic = true;
+  example::Report report("legend", "");
+  report.add(plot);
+  report.add(example::LinePlot{
+      .title = "small", .x_values = {0, 1}, .curves = {{"tiny", Ink::belief, {2e-5, 9e-5}}}});
+  const cairn_test::Folder folder;
+  cairn::write_file_atomically(folder / "page.html", before_all(report.html().value(), listener) + saver);
+  const OpenedPage opened = cairn_test::open_page(folder, folder / "page.html");
+  CHECK(opened.console == "");
+  CHECK(opened.has("data-saved=\"2 of 2 saved\""));
+  REQUIRE(opened.has("data-said=\""));
+  const std::string said = "|" + between(opened.document, "data-said=\"", "\"") + "|";
+  CAPTURE(said);
+  CHECK(said.find("|100|") != std::string::npos);
+  CHECK(said.find("e-14") == std::string::npos);
+  CHECK(said.find("|4e-5|") != std::string::npos);
+  for (const char* name : {"|first|", "|second|", "|tiny|"}) CHECK(said.find(name) != std::string::npos);
+  CHECK(opened.has("stroke-dasharray=\"11 4 3 4\""));  // of Ink::wrong
+  CHECK(opened.has("stroke-dasharray=\"13 5\""));      // of Ink::teal
 }
 
 TEST_SUITE_END();

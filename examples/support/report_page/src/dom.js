@@ -33,7 +33,7 @@ export function labelled({ label, unit }) {
 export function readable(value) {
   if (value === null || value === undefined || Number.isNaN(value)) return '–';
   const size = Math.abs(value);
-  if (size !== 0 && (size < 1e-3 || size >= 1e6)) return value.toExponential(2);
+  if (size !== 0 && (size < 1e-4 || size >= 1e6)) return value.toExponential(2).replace(/\.?0+e/, 'e').replace('e+', 'e');
   return String(Number(value.toPrecision(4)));
 }
 
@@ -61,7 +61,7 @@ export function dashesOf(curve, count) {
 const svgSpace = 'http://www.w3.org/2000/svg';
 
 /** A piece of a line, as legends show it. */
-function sample(dashes) {
+export function sample(dashes) {
   const svg = document.createElementNS(svgSpace, 'svg');
   const line = document.createElementNS(svgSpace, 'line');
   for (const [name, value] of Object.entries({ width: 30, height: 8, 'aria-hidden': 'true' })) svg.setAttribute(name, value);

@@ -9,6 +9,7 @@ import { picture, table } from './plain.js';
 import { lines } from './plots.js';
 import { saveButton } from './save.js';
 import { startTheme, toggleTheme } from './theme.js';
+import { explained } from './words.js';
 
 const kinds = {
   lines: { draw: lines, empty: (panel) => panel.curves.length + panel.bands.length === 0 || panel.x_values.length === 0 },
@@ -78,6 +79,7 @@ const page = document.getElementById('page');
 const grid = element('div', { className: 'panels' });
 page.append(...[head(data), figures(data), notes(data), contents(data), grid].filter((part) => part !== null));
 data.panels.forEach((panel, i) => show(panel, i + 1, grid));
+page.append(explained(page) ?? '');
 // ?figure=2 shows the second figure and nothing else: for pictures of it (docs/site).
 const only = document.getElementById(`figure-${new URLSearchParams(location.search).get('figure')}`);
 if (only) {

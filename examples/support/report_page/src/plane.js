@@ -94,13 +94,13 @@ function view(panel, all, body) {
   const names = [...new Map(all.map((curve) => [curve.name, curve])).values()];
   const lines = names.filter((curve) => !curve.dots && !curve.filled).length;
   const bounds = frameOf(all);
-  const height = panel.wide ? 520 : panel.third ? 340 : 420;
+  const most = panel.wide ? 520 : panel.third ? 340 : 420;
   let shown = all;
   const paths = (plot, index) => drawNamed(plot, shown.filter((curve) => curve.name === names[index - 1].name), lines);
   const options = {
     mode: 2,
     width: 600,
-    height,
+    height: most,
     scales: { x: { time: false, auto: false, range: bounds.x }, y: { auto: false, range: bounds.y } },
     axes: [horizontal(panel.x), axisOptions(panel.y)],
     legend: { show: false },
@@ -111,7 +111,7 @@ function view(panel, all, body) {
   body.append(place);
   const plot = new uPlot(options, [null, ...names.map((curve) => [curve.x, curve.y])], place);
   onResize(place, (width) => {
-    plot.setSize({ width, height });
+    plot.setSize({ width, height: Math.min(most, Math.max(300, Math.round(1.05 * width))) }); // a phone is narrow
     // Twice: numbers of another length leave another room.
     fit(plot, bounds, panel.equal_scale);
     fit(plot, bounds, panel.equal_scale);

@@ -1,6 +1,6 @@
 // Plots with uPlot of curves over a common axis, and what its axes look like.
 import uPlot from 'uplot';
-import { colour, dashesOf, element, labelled, onResize, readable } from './dom.js';
+import { colour, dashesOf, element, labelled, onResize, readable, sample } from './dom.js';
 import { onTheme } from './theme.js';
 
 const pairing = uPlot.sync('common axis');
@@ -57,6 +57,14 @@ function positive(values) {
   return values.map((value) => (value > 0 ? value : null));
 }
 
+/** From where on a logarithmic axis shows: a few values of rounding alone do not squeeze all others into its top. */
+function floorOf(values) {
+  const sorted = values.flat().filter((value) => value !== null && value > 0).sort((a, b) => a - b);
+  if (sorted.length === 0) return 0;
+  const usual = sorted[Math.floor(0.02 * sorted.length)];
+  return sorted[0] < 1e-3 * usual ? usual / 3 : sorted[0];
+}
+
 /** Linear axes keep a little air and never collapse where all values are equal. */
 function linearRange(_, low, high) {
   if (low === null) return [0, 1];
@@ -79,27 +87,34 @@ function seriesOf(panel) {
   return [...edges, ...panel.curves];
 }
 
-/** The border of a curve's sign in the legend. */
-function dashOf(curve, count) {
-  if (!curve || curve.edge) return 'solid';
-  if (curve.dots) return 'dotted';
-  return dashesOf(curve, count).length > 0 ? 'dashed' : 'solid';
+/** The curves' signs in the legend: pieces of the lines as they are drawn. */
+function signs(place, series, count) {
+  place.querySelectorAll('.u-series').forEach((row, i) => {
+    const curve = series[i - 1];
+    if (!curve) return;
+    const shape = curve.edge ? 'filled' : curve.dots ? 'dots' : null;
+    row.style.setProperty('--ink', `var(--${curve.ink})`);
+    row.querySelector('th').prepend(shape ? element('i', { className: shape }) : sample(dashesOf(curve, count)));
+  });
 }
 
 export function lines(panel, body) {
   const series = seriesOf(panel);
   const count = series.filter((curve) => !curve.edge && !curve.dots).length;
   const values = series.map((curve) => (panel.logarithmic ? positive(curve.values) : curve.values));
+  const floor = panel.logarithmic ? floorOf(values) : 0;
+  const logarithmicRange = (_, low, high) =>
+    (low === null ? [1, 10] : uPlot.rangeLog(Math.min(Math.max(low, floor), high), high, 10, true));
   const options = {
     width: 600,
     height: panel.wide ? 280 : 260,
     scales: {
       x: panel.logarithmic_x ? { time: false, distr: 3, range: (_, low, high) => [low, high] } : { time: false },
-      y: panel.logarithmic ? { distr: 3 } : { range: linearRange },
+      y: panel.logarithmic ? { distr: 3, range: logarithmicRange } : { range: linearRange },
     },
     axes: [panel.logarithmic_x ? logarithmic(panel.x) : horizontal(panel.x), axisOptions(panel.y)],
     cursor: { sync: { key: pairing.key, setSeries: false }, focus: { prox: 30 }, points: { size: 6 } },
-    legend: { markers: { dash: (_, index) => dashOf(series[index - 1], count) } },
+    legend: { markers: { show: false } },
     bands: panel.bands.map((band, i) => ({ series: [2 * i + 1, 2 * i + 2], fill: () => tint(band.ink, 16) })),
     series: [
       { label: labelled(panel.x), value: (_, value) => readable(value) },
@@ -120,6 +135,7 @@ export function lines(panel, body) {
   const place = element('div');
   body.append(place);
   const plot = new uPlot(options, [panel.x_values, ...values], place);
+  signs(place, series, count);
   onResize(place, (width) => plot.setSize({ width, height: options.height }));
   onTheme(() => plot.redraw(false));
 }
