@@ -13,6 +13,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/cholesky.hpp>
+#include <cairn/core/statistics.hpp>
 
 #include "support/sparse_least_squares.hpp"
 
@@ -25,6 +26,12 @@ using cairn::SE2;
 using cairn::Vector;
 
 using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
+
+/// Of a sighting from where it should be seen, and its noise.
+std::pair<Vector<2>, Matrix<2>> error_of(const PointSensor& sensor, const SE2& x, const Vector<2>& m,
+                                         const Map::Sighting& sighting) {
+  return {-cairn::local(sensor.predict(x, m), sighting.z), sensor.noise(x, sensor.initialise(x, sighting.z))};
+}
 
 struct Estimate {
   std::vector<SE2> poses;
@@ -91,8 +98,7 @@ private:
                     const Map::Sighting& sighting) const {
     const SE2& x = at.poses[k];
     const Vector<2>& m = at.landmarks.at(*sighting.identity);
-    const Vector<2> e = -cairn::local(log_.sensor.predict(x, m), sighting.z);
-    const Matrix<2> noise = log_.sensor.noise(x, log_.sensor.initialise(x, sighting.z));
+    const auto [e, noise] = error_of(log_.sensor, x, m, sighting);
     add<2, 3, 2>(to, e, noise, 3 * static_cast<int>(k), log_.sensor.state_jacobian(x, m),
                  row_of_.at(*sighting.identity), log_.sensor.part_jacobian(x, m));
   }
@@ -118,6 +124,30 @@ BatchOptimum batch_optimum(const LandmarkLog& log, const std::vector<SE2>& start
       std::move(first), [&](const Estimate& at) { return problem.equations_at(at); },
       [&](const Estimate& at, const Eigen::VectorXd& d) { return problem.moved(at, d); });
   return {std::move(best.at.poses), std::move(best.at.landmarks), best.cost, best.iterations, best.converged};
+}
+
+BatchOptimum doubting_batch_optimum(LandmarkLog& log, const std::vector<SE2>& start) {
+  static const double most = cairn::chi_square_quantile(1 - 1e-7, 2);
+  constexpr int most_rounds = 50;
+  BatchOptimum optimum = batch_optimum(log, start);
+  for (int round = 0; round < most_rounds; ++round) {
+    std::vector<std::pair<double, Map::Sighting*>> off;  // squared, in sigmas
+    double worst = 0;
+    for (std::size_t k = 0; k < log.frames.size(); ++k)
+      for (auto& sighting : log.frames[k].seen) {
+        if (!sighting.identity) continue;
+        const auto& [e, noise] =
+            error_of(log.sensor, optimum.poses[k], optimum.landmarks.at(*sighting.identity), sighting);
+        const double squared = cairn::Cholesky<2>(noise).whiten(e).squaredNorm();
+        if (squared > most) off.emplace_back(squared, &sighting);
+        worst = std::max(worst, squared);
+      }
+    if (off.empty()) break;
+    for (const auto& [squared, sighting] : off)
+      if (squared >= worst / 4) sighting->identity.reset();
+    optimum = batch_optimum(log, optimum.poses);
+  }
+  return optimum;
 }
 
 BatchOptimum growing_batch_optimum(const LandmarkLog& log, std::size_t by) {

@@ -45,12 +45,15 @@ std::vector<SE2> means_of(const Belief& belief, std::size_t particle) {
 }
 
 /// Which landmarks the sightings along a path are of: by their names, or the likeliest at each pose in turn.
-std::vector<cairn::Association> associations_along(const LandmarkLog& log, const std::vector<SE2>& poses,
-                                                   Map map) {
+/// Names that `believed` has lost are of nothing.
+std::vector<cairn::Association> associations_along(const LandmarkLog& log, const LandmarkLog& believed,
+                                                   const std::vector<SE2>& poses, Map map) {
   std::vector<cairn::Association> all;
   for (std::size_t k = 0; k < poses.size(); ++k) {
     const auto& seen = log.frames[k].seen;
     all.push_back(map.likeliest(map.candidates({poses[k], Matrix<3>::Zero()}, seen)).choice);
+    for (std::size_t i = 0; i < seen.size(); ++i)
+      if (seen[i].identity && !believed.frames[k].seen[i].identity) all.back()[i] = cairn::no_landmark;
     map.insert(poses[k], seen, all.back());
   }
   return all;
@@ -65,6 +68,7 @@ LandmarkLog named(const LandmarkLog& log, const std::vector<cairn::Association>&
     for (std::size_t i = 0; i < frame.seen.size(); ++i) {
       auto& identity = frame.seen[i].identity;
       const std::uint32_t n = associations[k][i];
+      if (n == cairn::no_landmark) identity.reset();
       if (identity || n == cairn::no_landmark) continue;
       identity = n == cairn::new_landmark ? numbers++ : n;
     }
@@ -79,6 +83,13 @@ bool all_named(const LandmarkLog& log, std::uint64_t frames, const cairn::Landma
     for (const auto& sighting : log.frames[k].seen)
       if (!sighting.identity) return false;
   return true;
+}
+
+std::size_t unnamed_in(const LandmarkLog& log) {
+  std::size_t count = 0;
+  for (const Frame& frame : log.frames)
+    for (const auto& sighting : frame.seen) count += !sighting.identity;
+  return count;
 }
 
 /// What the particles' own model says of a path: its map, and log p(x_1:t, n_1:t, z_1:t).
@@ -142,7 +153,9 @@ double next_power(const std::vector<Moving>& all, double power, double least) {
 /// with those of one of them: as often as they are likely when the path that they go with is integrated out,
 /// by Laplace's approximation, for what a particle's weight says of its names is blurred by the chance bends
 /// of its own path. The ratio is over both, and so makes up for what the approximation errs by. `optimum` is
-/// where the last one was, and then where that of the likeliest names is.
+/// where the last one was, and then where that of the likeliest names is. Names that are given are believed
+/// but where all else contradicts them: a step of the filter has to, for its map may have drifted, and only
+/// the whole log tells.
 class Redrawing {
 public:
   Redrawing(const Belief& belief, const LandmarkLog& log, const SlamOptions& options,
@@ -155,6 +168,9 @@ public:
         all_(belief.size()) {
     optimum = std::ranges::max_element(names_, {}, &Names::log_share)->density.optimum().poses;
   }
+
+  /// Names that were given and are not believed.
+  [[nodiscard]] std::size_t doubted() const { return doubted_; }
 
   [[nodiscard]] Belief redrawn() {
     const std::vector<std::size_t> drawn = drawn_names();
@@ -186,18 +202,31 @@ private:
   };
   Names named_so(std::vector<cairn::Association> associations, const std::vector<SE2>& start) const {
     const LandmarkLog part = named(log_, associations);
-    PathDensity density(part, batch_optimum(part, start));
+    return named_so(std::move(associations), part, batch_optimum(part, start));
+  }
+  Names named_so(std::vector<cairn::Association> associations, const LandmarkLog& part,
+                 BatchOptimum optimum) const {
+    PathDensity density(part, std::move(optimum));
     const std::vector<SE2>& poses = density.optimum().poses;
     const double log_evidence =
         replayed(log_, associations, poses, empty_).log_density - density.log_density(poses);
     return {std::move(associations), std::move(density), log_evidence};
   }
-  std::vector<Names> names_of(const Belief& belief, std::vector<SE2> start) const {
-    const std::size_t asked = all_named(log_, frames_, options_.landmarks) ? 1 : 16;
+  std::vector<Names> names_of(const Belief& belief, std::vector<SE2> start) {
+    const bool is_named = all_named(log_, frames_, options_.landmarks);
+    const std::size_t asked = is_named ? 1 : 16;
     const std::vector<SE2> best = means_of(belief, belief.best());
     for (std::size_t k = start.size(); k < frames_; ++k)
       start.push_back(k == 0 ? best[0] : start[k - 1] * best[k - 1].inverse() * best[k]);
     cairn::Random choice(~options_.seed, (frames_ << 32U) + belief.size());
+    std::optional<LandmarkLog> believed;
+    std::optional<BatchOptimum> best_of_believed;
+    if (is_named) {
+      const auto end = log_.frames.begin() + static_cast<std::ptrdiff_t>(frames_);
+      believed = LandmarkLog{.name = log_.name, .sensor = log_.sensor, .frames = {log_.frames.begin(), end}};
+      best_of_believed = doubting_batch_optimum(*believed, start);
+      doubted_ = unnamed_in(*believed);
+    }
     std::vector<std::vector<cairn::Association>> seen;
     auto particles =
         cairn::resampled_indices(belief.particles().weights(), asked, cairn::Resampling::systematic, choice);
@@ -206,13 +235,15 @@ private:
       std::vector<SE2> poses;
       for (const auto& each : belief.path(i)) poses.push_back(each.pose);
       poses.erase(poses.begin());  // the start
-      auto associations = associations_along(log_, poses, empty_);
+      auto associations = associations_along(log_, believed ? *believed : log_, poses, empty_);
       if (std::find(seen.begin(), seen.end(), associations) == seen.end())
         seen.push_back(std::move(associations));
     }
     std::vector<std::optional<Names>> all(seen.size());
     cairn::parallel_for(seen.size(), options_.threads, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) all[i].emplace(named_so(std::move(seen[i]), start));
+      for (std::size_t i = begin; i < end; ++i)
+        all[i].emplace(is_named ? named_so(std::move(seen[i]), *believed, std::move(*best_of_believed))
+                                : named_so(std::move(seen[i]), start));
     });
     std::vector<double> log_evidence;
     for (const auto& names : all) log_evidence.push_back(names->log_share);
@@ -310,6 +341,7 @@ private:
   const SlamOptions& options_;
   std::uint64_t frames_;
   Map empty_;
+  std::size_t doubted_ = 0;
   std::vector<Names> names_;
   std::vector<Moving> all_;
   std::uint64_t rounds_ = 0;
@@ -564,6 +596,7 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
       .resample_below = options.resample_below, .seed = options.seed, .threads = options.threads};
   const bool redraws = options.redraw_below > 0 && options.proposal == ProposalKind::landmarks;
   Spread spread(belief);
+  std::size_t doubted = 0;
   std::vector<SE2> odometry, optimum;
   const std::size_t every = std::max<std::size_t>(1, log.frames.size() / 40);
   for (const Frame& frame : log.frames) {
@@ -573,7 +606,9 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
     std::optional<double> redrawn_size;
     const bool is_last = belief.steps() == log.frames.size();  // the path and map that are handed over
     if (redraws && (is_last || redraw_is_due(belief, log, spread.step(), options))) {
-      belief = Redrawing(belief, log, options, optimum).redrawn();
+      Redrawing redrawing(belief, log, options, optimum);
+      belief = redrawing.redrawn();
+      doubted = redrawing.doubted();
       redrawn_size = belief.particles().effective_size();
       spread.drawn(belief);
     }
@@ -594,6 +629,9 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
   }
   r.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   r.cpu_seconds = static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC;
+  if (doubted > 0)
+    r.notes.push_back(std::to_string(doubted) + (doubted == 1 ? " sighting is" : " sightings are") +
+                      " not of what the name says: left out");
   r.odometry = filled(log, odometry);
   r.best = filled(log, means_of(belief, belief.best()));
   r.mean = filled(log, mean_path(belief));

@@ -49,7 +49,7 @@ struct StepRecord {
   std::optional<double>
       redrawn{};  ///< effective number of the paths that were drawn again here, if they were
   std::size_t sightings = 0, landmarks = 0;  ///< of the frame; of the first particle
-  cairn::Gaussian<cairn::SE2> pose{};  ///< with redrawing also of the ancestors that were lost since
+  cairn::Gaussian<cairn::SE2> pose{};        ///< with redrawing also of the ancestors that were lost since
   std::optional<double> nees{};  ///< of the pose, where the truth is known: of a start that is exact
 };
 

@@ -232,6 +232,45 @@ TEST_SUITE("fastslam/slam") {
     }
   }
 
+  TEST_CASE(
+      "fastslam: names that all else contradicts are found, those and no others, and do not bend the path") {
+    for (const std::uint64_t seed : {1U, 2U, 3U}) {
+      CAPTURE(seed);
+      const LandmarkLog clean = simulated(loop_map(), seed, 300);
+      LandmarkLog log = clean;
+      std::size_t wrong = 0;
+      for (const std::size_t first : {60U, 61U, 62U, 150U, 222U}) {
+        Frame& frame = log.frames[first];
+        REQUIRE(!frame.seen.empty());
+        // That of the landmark farthest from what is seen.
+        const SE2& at = clean.truth[first].pose;
+        const Vector<2> seen = at * Vector<2>(log.sensor.initialise(SE2(), frame.seen[0].z));
+        const auto farthest = std::ranges::max_element(
+            log.landmarks, {}, [&](const auto& landmark) { return (landmark.second - seen).norm(); });
+        frame.seen[0].identity = farthest->first;
+        ++wrong;
+      }
+      LandmarkLog believed = log;
+      static_cast<void>(doubting_batch_optimum(believed, growing_batch_optimum(clean).poses));
+      for (std::size_t k = 0; k < log.frames.size(); ++k)
+        for (std::size_t i = 0; i < log.frames[k].seen.size(); ++i)
+          CHECK(believed.frames[k].seen[i].identity.has_value() ==
+                (log.frames[k].seen[i].identity == clean.frames[k].seen[i].identity));
+      LandmarkLog as_it_was = clean;
+      const BatchOptimum optimum = doubting_batch_optimum(as_it_was, growing_batch_optimum(clean).poses);
+      CHECK(optimum.cost == doctest::Approx(growing_batch_optimum(clean).cost));
+      for (const Frame& frame : as_it_was.frames)
+        for (const auto& sighting : frame.seen) CHECK(sighting.identity.has_value());
+
+      const Results r = run(log, {.particles = 20, .seed = seed}),
+                    right = run(clean, {.particles = 20, .seed = seed});
+      MESSAGE("path ", *r.path_error, " m, with right names ", *right.path_error, " m");
+      CHECK(*r.path_error < 1.5 * *right.path_error + 0.02);
+      REQUIRE(r.notes.size() == right.notes.size() + 1);
+      CHECK(r.notes.back() == std::to_string(wrong) + " sightings are not of what the name says: left out");
+    }
+  }
+
   TEST_CASE("fastslam: by the default the spread of a hundred particles holds the truth as EKF-SLAM's does") {
     constexpr std::size_t runs = 20, frames = 100;
     std::vector<double> particles(frames, 0), never(frames, 0), joint(frames, 0);
