@@ -152,7 +152,7 @@ int main(int argc, char** argv) {
   Options options;
   CLI::App app{"Maps a floor from laser scans and odometry: a particle filter over occupancy grids."};
   auto* log =
-      app.add_option("--log", options.log, "a CARMEN log (FLASER or ROBOTLASER1 lines) or one of DP-SLAM");
+      app.add_option("--log", options.log, "a CARMEN log (FLASER, ROBOTLASER1 or RAWLASER1 lines) or one of DP-SLAM");
   app.add_flag("--simulate", options.simulate, "a rendered drive around a corridor, also without --log")
       ->excludes(log);
   app.add_option("--map", options.map,

@@ -85,7 +85,7 @@ TEST_SUITE("io/carmen") {
 
   TEST_CASE("carmen: bad lines are refused with the line and what was expected") {
     CHECK(words_of("").find("none") != std::string::npos);
-    CHECK(words_of(wheels).find("expected lines FLASER, ROBOTLASER1 or Laser, found none") !=
+    CHECK(words_of(wheels).find("expected lines FLASER, ROBOTLASER1, RAWLASER1 or Laser, found none") !=
           std::string::npos);
     CHECK(words_of("FLASER 3 1 2\n").find("log:1: expected a range: a finite number (the line ends") !=
           std::string::npos);
@@ -113,6 +113,21 @@ TEST_SUITE("io/carmen") {
     CHECK(log.scans[1].T_odom_robot.x() == doctest::Approx(0.5));
     CHECK(log.scans[1].T_odom_laser.x() == doctest::Approx(0.6));  // 0.1 m ahead of the robot
     CHECK(log.scans[2].T_odom_robot.x() == doctest::Approx(2));
+
+    // Raw scans know of no odometry; the scanner is where the parameter says.
+    const std::string raw = "RAWLASER1 0 -1 2 0.5 30 0.01 0 3 1 2 40 1 9 ";
+    CarmenLog unplaced = read("PARAM robot_frontlaser_offset 0.2 nohost 0\nPARAM a b nohost 0\n" +
+                              odometry(0, 1) + odometry(2, 2) + raw + "1.25 h 0\n" + raw + "1.5 h 0\n");
+    place_by_odometry(unplaced, "log");
+    REQUIRE(unplaced.scans.size() == 2);
+    CHECK(unplaced.scans[0].scan.first_angle == -1);
+    CHECK(unplaced.scans[0].scan.kind(2) == BeamKind::no_return);
+    CHECK(unplaced.scans[1].T_odom_robot.x() == doctest::Approx(1));
+    CHECK(unplaced.scans[1].T_odom_laser.x() == doctest::Approx(1.2));
+    // Beside scans that have a pose they are the same scans once more.
+    CHECK(read(raw + "1 h 0\n" + robot + raw + "2 h 0\n").scans.size() == 1);
+    CHECK(words_of(raw + "\n").find("the time: a finite number") != std::string::npos);
+    CHECK(words_of("PARAM robot_frontlaser_offset x\n").find("the laser's offset") != std::string::npos);
 
     CarmenLog none = read(scan + "1 h 0\n" + scan + "2 h 0\n");
     CHECK(cairn_test::message_of([&] { place_by_odometry(none, "log"); }).find("no ODOM line") !=

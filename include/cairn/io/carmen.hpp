@@ -2,17 +2,20 @@
 // SPDX-License-Identifier: MIT
 //
 /// @file
-/// Logs of CARMEN, in which the field's laser data sets are kept: FLASER, ROBOTLASER1 and ODOM lines; and
-/// those of DP-SLAM, of which a line Odometry and a line Laser are one step.
+/// Logs of CARMEN, in which the field's laser data sets are kept: FLASER, ROBOTLASER1, RAWLASER1 and ODOM
+/// lines; and those of DP-SLAM, of which a line Odometry and a line Laser are one step.
 ///
 ///   FLASER n r_1..r_n  laser x y theta  robot x y theta  time host logger_time
 ///   ROBOTLASER1 type first_angle field_of_view step farthest accuracy mode  n r_1..r_n  m e_1..e_m
 ///               laser x y theta  robot x y theta  tv rv forward side turn  time host logger_time
+///   RAWLASER1 type first_angle field_of_view step farthest accuracy mode  n r_1..r_n  m e_1..e_m
+///               time host logger_time
+///   PARAM robot_frontlaser_offset metres
 ///   ODOM x y theta tv rv acceleration  time host logger_time
 ///   Odometry x y theta
 ///   Laser n r_1..r_n
 /// (CARMEN robot navigation toolkit, manual, "log file format"; DP-SLAM 0.1.1, OpenSLAM.) Metres, radians,
-/// seconds. Other lines (PARAM, SYNC, comments, ...) are of no concern. The order of the file is the order of
+/// seconds. Other lines (SYNC, comments, ...) are of no concern. The order of the file is the order of
 /// events, also where times run back, as in published logs: nothing is sorted.
 #pragma once
 
@@ -132,23 +135,39 @@ inline StampedScan front_laser(CarmenFields fields, double farthest) {
   return s;
 }
 
-inline StampedScan robot_laser(CarmenFields fields, double farthest) {
-  StampedScan s;
+/// What ROBOTLASER1 and RAWLASER1 begin with.
+inline LaserScan described_scan(CarmenFields& fields, double farthest) {
+  LaserScan scan;
   fields.number("the type");
-  s.scan.first_angle = fields.number("the first angle");
+  scan.first_angle = fields.number("the first angle");
   fields.number("the field of view");
-  s.scan.angle_step = fields.number("the angle between beams");
-  s.scan.farthest = std::min(farthest, fields.number("the largest range"));
+  scan.angle_step = fields.number("the angle between beams");
+  scan.farthest = std::min(farthest, fields.number("the largest range"));
   fields.number("the accuracy");
   fields.number("the mode");
-  fields.ranges(s.scan.range, fields.count("the number of ranges"));
+  fields.ranges(scan.range, fields.count("the number of ranges"));
   for (std::size_t left = fields.count("the number of remissions"); left > 0; --left)
     fields.number("a remission");
+  return scan;
+}
+
+inline StampedScan robot_laser(CarmenFields fields, double farthest) {
+  StampedScan s;
+  s.scan = described_scan(fields, farthest);
   s.T_odom_laser = fields.pose("the laser's pose");
   s.T_odom_robot = fields.pose("the robot's pose");
   for (const char* what :
        {"the velocity", "the turn rate", "the forward distance", "the side distance", "the turning axis"})
     fields.number(what);
+  s.time = fields.number("the time");
+  return s;
+}
+
+/// The scanner knows of no odometry: the pose is the start of it.
+inline StampedScan raw_laser(CarmenFields fields, double farthest, double ahead) {
+  StampedScan s;
+  s.scan = described_scan(fields, farthest);
+  s.T_odom_laser = SE2(ahead, 0, 0);
   s.time = fields.number("the time");
   return s;
 }
@@ -177,13 +196,17 @@ inline StampedScan dp_slam_laser(CarmenFields fields, const TextLines& lines,
 
 }  // namespace detail
 
-/// The scans and the odometry of a CARMEN log; ranges from `farthest` [m] on are no return. Throws Error
-/// naming the line, what was expected and what stands there; where there is no scan at all, Error as well.
+/// The scans and the odometry of a CARMEN log; ranges from `farthest` [m] on are no return. RAWLASER1 lines
+/// count where there are no others: their scans all carry the same pose, until place_by_odometry(). Throws
+/// Error naming the line, what was expected and what stands there; where there is no scan at all, Error as
+/// well.
 [[nodiscard]] inline CarmenLog read_carmen(const std::filesystem::path& path, double farthest = 40) {
   if (!(farthest > 0)) raise("read_carmen: expected a largest range above zero");
   TextLines lines(path, "a CARMEN log");
   CarmenLog log;
   std::optional<StampedOdometry> dp_slam;  // what a line Laser goes with
+  std::vector<StampedScan> raw;
+  double ahead = 0;  // [m] of the scanner before the robot's centre
   while (lines.next()) {
     const std::string_view line = lines.line();
     const std::string_view kind = line.substr(0, line.find_first_of(" \t"));
@@ -191,7 +214,12 @@ inline StampedScan dp_slam_laser(CarmenFields fields, const TextLines& lines,
       log.scans.push_back(detail::front_laser(detail::CarmenFields(lines), farthest));
     else if (kind == "ROBOTLASER1")
       log.scans.push_back(detail::robot_laser(detail::CarmenFields(lines), farthest));
-    else if (kind == "ODOM")
+    else if (kind == "RAWLASER1")
+      raw.push_back(detail::raw_laser(detail::CarmenFields(lines), farthest, ahead));
+    else if (kind == "PARAM") {
+      detail::CarmenFields fields(lines);
+      if (fields.take() == "robot_frontlaser_offset") ahead = fields.number("the laser's offset");
+    } else if (kind == "ODOM")
       log.odometry.push_back(detail::odometry(detail::CarmenFields(lines)));
     else if (kind == "Odometry")
       dp_slam = {static_cast<double>(log.scans.size()), detail::CarmenFields(lines).pose("the odometry")};
@@ -199,13 +227,15 @@ inline StampedScan dp_slam_laser(CarmenFields fields, const TextLines& lines,
       log.scans.push_back(
           detail::dp_slam_laser(detail::CarmenFields(lines), lines, std::exchange(dp_slam, {}), farthest));
   }
-  if (log.scans.empty()) raise(path.string() + ": expected lines FLASER, ROBOTLASER1 or Laser, found none");
+  if (log.scans.empty()) log.scans = std::move(raw);
+  if (log.scans.empty())
+    raise(path.string() + ": expected lines FLASER, ROBOTLASER1, RAWLASER1 or Laser, found none");
   return log;
 }
 
 /// Gives every scan a pose of the odometry, where the scans' own poses are all the same though the ODOM
-/// lines move (logs of CARMEN without a localisation): the newest one before it by time, moved on between
-/// neighbours in proportion. Throws Error where there is neither.
+/// lines move (RAWLASER1, logs of CARMEN without a localisation): the newest one before it by time, moved on
+/// between neighbours in proportion. Throws Error where there is neither.
 inline void place_by_odometry(CarmenLog& log, const std::string& name) {
   const auto moves = [](const auto& list, auto pose) {
     return std::ranges::any_of(list, [&](const auto& each) {
