@@ -269,6 +269,7 @@ void Mapper::process(const cairn::StampedScan& scan) {
   points_.push_back(cairn::scan_points(scan.scan));
   FromMatch proposal;
   proposal.widened = options_.widened;
+  proposal.evidence_share = options_.evidence_share;
   const cairn::ConditionalFilter filter{.resample_below = options_.resample_below,
                                         .evidence_share = options_.evidence_share,
                                         .insert = !frozen_.has_value(),

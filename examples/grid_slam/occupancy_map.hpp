@@ -65,6 +65,9 @@ struct FromMatch {
   /// where furniture was moved, a wrong place gains half a nat and now and then a whole one. A robot that
   /// drives the other way unseen makes the likely place wrong by two steps, which costs two.
   double rare_gain = 0.8, rare_change_gain = 1.3;
+  /// As the filter's. Motions are drawn by as much of their evidence as counts: one that a single scan
+  /// favours leaves some particles to the others, and the scans after it decide.
+  double evidence_share = 1;
   double widened = 1.0;  ///< standard deviations of the draws over those fitted
 
   [[nodiscard]] cairn::Proposed<cairn::SE2> operator()(const OccupancyMap& map,
@@ -82,19 +85,20 @@ struct FromMatch {
     }
     drop_unfounded(peaks, map.model.independence * static_cast<double>(z.size()));
     if (peaks.empty()) return cairn::FromMotion{}(map, motion, z, random);
-    std::vector<double> evidence;
-    for (const Peak& peak : peaks) evidence.push_back(peak.log_evidence);
-    const double total = cairn::log_sum_exp(evidence);
+    std::vector<double> shares;  // of the motions, once the scan is seen: logarithms
+    for (const Peak& peak : peaks)
+      shares.push_back(std::log(peak.mode->share) + evidence_share * peak.log_evidence);
+    const double total = cairn::log_sum_exp(shares);
     double left = random.uniform();
     std::size_t chosen = 0;
-    while (chosen + 1 < peaks.size() && left >= std::exp(evidence[chosen] - total))
-      left -= std::exp(evidence[chosen++] - total);
+    while (chosen + 1 < peaks.size() && left >= std::exp(shares[chosen] - total))
+      left -= std::exp(shares[chosen++] - total);
     const Peak& peak = peaks[chosen];
     const cairn::SE2 x = cairn::sample(peak.q, random);
     const double l = cairn::log_likelihood(map.grid, looked.field, z, x, map.model);
-    const double log_target = l + std::log(peak.mode->share) + cairn::log_density(peak.mode->motion, x);
-    const double log_drawn = evidence[chosen] - total + cairn::log_density(peak.q, x);
-    return {x, peak.q, log_target - log_drawn, l, peak.mode->regime};
+    const double log_target = l + cairn::log_density(peak.mode->motion, x);
+    const double log_drawn = peak.log_evidence + cairn::log_density(peak.q, x);
+    return {x, peak.q, total / evidence_share + log_target - log_drawn, l, peak.mode->regime};
   }
 
   /// The Gaussian that poses are drawn from under one motion, if the scan fits there at all.
@@ -131,8 +135,7 @@ private:
     const std::size_t regime = peaks.front().mode->regime;
     std::erase_if(peaks, [&](const Peak& peak) {
       const double gain = peak.mode->regime == regime ? rare_gain : rare_change_gain;
-      return peak.mode->share < rare_share &&
-             peak.log_evidence - std::log(peak.mode->share) < likely + gain * beams;
+      return peak.mode->share < rare_share && peak.log_evidence < likely + gain * beams;
     });
   }
 
@@ -161,7 +164,7 @@ private:
     if (mode.share < likely_share && found.inliers < enough) return found.inliers;
     peaks.push_back({&mode,
                      {found.pose, widened * widened * information.inverse()},
-                     std::log(mode.share) + found.log_likelihood + found.log_prior -
+                     found.log_likelihood + found.log_prior -
                          0.5 * (motion.log_determinant() + information.log_determinant())});
     return found.inliers;
   }

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include "mapper.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <vector>
@@ -55,32 +57,48 @@ Seen seen_in_the_corridor() {
   return seen;
 }
 
+Gaussian<SE2> moved_by(const Seen& seen, const Vector<3>& off) {
+  return {retract(seen.truth, off), Matrix<3>(Vector<3>(9e-4, 9e-4, 4e-4).asDiagonal())};
+}
+
+/// The integral of likelihood times motion over a lattice of poses, and where it lies.
+struct Evidence {
+  double log_integral = 0;
+  Vector<3> mean = Vector<3>::Zero();  ///< steps from the motion's mean
+};
+
+Evidence evidence(const Seen& seen, const Gaussian<SE2>& motion) {
+  double most = -1e300, integral = 0;
+  std::vector<double> terms;
+  std::vector<Vector<3>> steps;
+  constexpr int half = 24;
+  const Vector<3> spacing(0.0045, 0.0045, 0.003);
+  for (int a = -half; a <= half; ++a)
+    for (int y = -half; y <= half; ++y)
+      for (int x = -half; x <= half; ++x) {
+        steps.push_back(Vector<3>(x, y, a).cwiseProduct(spacing));
+        const SE2 pose = retract(motion.mean, steps.back());
+        terms.push_back(seen.map.log_likelihood(pose, seen.points) + log_density(motion, pose));
+        most = std::max(most, terms.back());
+      }
+  Evidence all;
+  for (std::size_t i = 0; i < terms.size(); ++i) {
+    const double weight = std::exp(terms[i] - most) * spacing.prod();
+    integral += weight;
+    all.mean += weight * steps[i];
+  }
+  all.mean /= integral;
+  all.log_integral = most + std::log(integral);
+  return all;
+}
+
 }  // namespace
 
 TEST_SUITE("grid_slam/mapper") {
   TEST_CASE("mapper: the proposal's exact weight integrates to what a lattice of poses gives, mean and all") {
     const Seen seen = seen_in_the_corridor();
-    const Gaussian<SE2> motion{retract(seen.truth, Vector<3>(0.02, -0.02, 0.01)),
-                               Matrix<3>(Vector<3>(9e-4, 9e-4, 4e-4).asDiagonal())};
-    double integral = 0, most = -1e300;
-    std::vector<double> terms;
-    Vector<3> mean = Vector<3>::Zero();
-    constexpr int half = 24;
-    const Vector<3> spacing(0.0045, 0.0045, 0.003);
-    std::vector<Vector<3>> steps;
-    for (int a = -half; a <= half; ++a)
-      for (int y = -half; y <= half; ++y)
-        for (int x = -half; x <= half; ++x) {
-          steps.push_back(Vector<3>(x, y, a).cwiseProduct(spacing));
-          const SE2 pose = retract(motion.mean, steps.back());
-          terms.push_back(seen.map.log_likelihood(pose, seen.points) + log_density(motion, pose));
-          most = std::max(most, terms.back());
-        }
-    for (std::size_t i = 0; i < terms.size(); ++i) {
-      integral += std::exp(terms[i] - most) * spacing.prod();
-      mean += std::exp(terms[i] - most) * spacing.prod() * steps[i];
-    }
-    mean /= integral;
+    const Gaussian<SE2> motion = moved_by(seen, Vector<3>(0.02, -0.02, 0.01));
+    const Evidence by_lattice = evidence(seen, motion);
 
     RegimeMotion<SE2> regimes;
     regimes.modes.push_back({0, 1, motion});
@@ -93,14 +111,48 @@ TEST_SUITE("grid_slam/mapper") {
       Vector<3> drawn = Vector<3>::Zero();
       for (int i = 0; i < draws; ++i) {
         const auto p = proposal(seen.map, regimes, seen.points, random);
-        const double weight = std::exp(p.log_weight - most);
+        const double weight = std::exp(p.log_weight - by_lattice.log_integral);
         sum += weight / draws;
         drawn += weight / draws * local(motion.mean, p.pose);
       }
       drawn /= sum;
-      CHECK(sum == doctest::Approx(integral).epsilon(0.05));
-      CHECK((drawn - mean).head<2>().norm() < 1e-3);
-      CHECK(std::abs(drawn(2) - mean(2)) < 5e-4);
+      CHECK(sum == doctest::Approx(1).epsilon(0.05));
+      CHECK((drawn - by_lattice.mean).head<2>().norm() < 1e-3);
+      CHECK(std::abs(drawn(2) - by_lattice.mean(2)) < 5e-4);
+    }
+  }
+
+  TEST_CASE(
+      "mapper: of motions that explain a scan each is drawn by its share times what counts of its evidence") {
+    const Seen seen = seen_in_the_corridor();
+    const std::array<double, 2> share{0.7, 0.3};
+    RegimeMotion<SE2> motion;
+    std::array<double, 2> by_lattice{};
+    const std::array<Vector<3>, 2> off{Vector<3>(0.07, -0.06, 0.04), Vector<3>(0.01, 0.01, 0)};
+    for (std::size_t k = 0; k < 2; ++k) {
+      motion.modes.push_back({k, share[k], moved_by(seen, off[k])});
+      by_lattice[k] = evidence(seen, motion.modes[k].motion).log_integral;
+    }
+    const double gain = by_lattice[1] - by_lattice[0];
+    CAPTURE(gain);
+    REQUIRE(gain > 3);  // else all of it or a part makes no difference
+    for (const double counts : {1.0, 0.12}) {
+      CAPTURE(counts);
+      const double odds = share[1] / share[0] * std::exp(counts * gain);
+      FromMatch proposal;
+      proposal.evidence_share = counts;
+      Random random(cairn_test::seed());
+      constexpr int draws = 2000;
+      double second = 0, sum = 0;
+      for (int i = 0; i < draws; ++i) {
+        const auto p = proposal(seen.map, motion, seen.points, random);
+        second += p.regime == 1 ? 1.0 / draws : 0;
+        sum += std::exp(counts * (p.log_weight - by_lattice[0])) / draws;
+      }
+      const double expected = odds / (1 + odds);
+      // Four deviations of so many draws, and a Gaussian instead of the likelihood's shape.
+      CHECK(std::abs(second - expected) < 4 * std::sqrt(expected * (1 - expected) / draws) + 0.01);
+      CHECK(sum == doctest::Approx(share[0] * (1 + odds)).epsilon(0.05));
     }
   }
 
