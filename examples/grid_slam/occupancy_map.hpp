@@ -13,6 +13,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <numbers>
 #include <optional>
@@ -23,6 +24,7 @@
 #include <cairn/core/random.hpp>
 #include <cairn/filter/conditional.hpp>
 #include <cairn/filter/gaussian.hpp>
+#include <cairn/grid/obstacle_rings.hpp>
 #include <cairn/manifold/se2.hpp>
 #include <cairn/scan/match.hpp>
 #include <cairn/scan/occupancy_grid.hpp>
@@ -85,9 +87,16 @@ struct FromMatch {
     }
     drop_unfounded(peaks, map.model.independence * static_cast<double>(z.size()));
     if (peaks.empty()) return cairn::FromMotion{}(map, motion, z, random);
-    std::vector<double> shares;  // of the motions, once the scan is seen: logarithms
+    // Likely motions by all of their evidence, rare ones by what counts of what they gain over those.
+    double likely = -std::numeric_limits<double>::infinity();
     for (const Peak& peak : peaks)
-      shares.push_back(std::log(peak.mode->share) + evidence_share * peak.log_evidence);
+      if (peak.mode->share >= likely_share) likely = std::max(likely, peak.log_evidence);
+    if (!std::isfinite(likely)) likely = peaks.front().log_evidence;
+    std::vector<double> shares;  // of the motions, once the scan is seen: logarithms
+    for (const Peak& peak : peaks) {
+      const double counts = peak.mode->share >= likely_share ? 1 : evidence_share;
+      shares.push_back(std::log(peak.mode->share) + counts * (peak.log_evidence - likely));
+    }
     const double total = cairn::log_sum_exp(shares);
     double left = random.uniform();
     std::size_t chosen = 0;
@@ -98,7 +107,7 @@ struct FromMatch {
     const double l = cairn::log_likelihood(map.grid, looked.field, z, x, map.model);
     const double log_target = l + cairn::log_density(peak.mode->motion, x);
     const double log_drawn = peak.log_evidence + cairn::log_density(peak.q, x);
-    return {x, peak.q, total / evidence_share + log_target - log_drawn, l, peak.mode->regime};
+    return {x, peak.q, likely + total / evidence_share + log_target - log_drawn, l, peak.mode->regime};
   }
 
   /// The Gaussian that poses are drawn from under one motion, if the scan fits there at all.
@@ -170,7 +179,8 @@ private:
   }
 
   /// The best of a lattice of poses over two standard deviations of the motion, no finer than what the widest
-  /// kernel bridges; the mean itself where the motion is no wider.
+  /// kernel bridges; the mean itself where the motion is no wider. All are ranked by how near to obstacles
+  /// the points fall, and the first of them looked at.
   [[nodiscard]] cairn::SE2 best_start(const OccupancyMap& map, Looked& looked,
                                       const cairn::Gaussian<cairn::SE2>& motion) const {
     constexpr double reach = 0.15, turn = 0.08;               // [m], [rad] between neighbours
@@ -184,30 +194,88 @@ private:
     if (nx + ny + na == 0) return motion.mean;
     cairn::EndPointModel wide = map.model;
     wide.sigma *= coarse.empty() ? 1 : coarse.front().width;
-    // No point makes a scan likelier: a pose is left as soon as those looked at make it less likely than the
-    // best, which is most often soon where they look in all directions.
-    constexpr std::size_t parts = 8;
-    std::vector<std::vector<cairn::ScanPoint>> few(parts);
-    const std::vector<cairn::ScanPoint> all = cairn::thinned(looked.few, 2 * thinning);
-    for (std::size_t i = 0; i < all.size(); ++i) few[i % parts].push_back(all[i]);
-    cairn::SE2 best = motion.mean;
-    double most = -std::numeric_limits<double>::infinity();
-    const auto look_at = [&](const cairn::SE2& pose) {
-      double l = 0;
-      for (const auto& part : few) {
-        l += cairn::log_likelihood(map.grid, looked.field, part, pose, wide);
-        if (l <= most) return;
-      }
-      most = l;
-      best = pose;
-    };
-    look_at(motion.mean);
-    for (int a = -na; a <= na; ++a)
+    const std::vector<cairn::ScanPoint> points = cairn::thinned(looked.few, 2 * thinning);
+    FirstFew first;
+    Ranking ranking(map.grid, wide, points);
+    for (int a = -na; a <= na; ++a) {
+      ranking.turn(motion.mean.angle() + turn * a);
       for (int y = -ny; y <= ny; ++y)
-        for (int x = -nx; x <= nx; ++x)
-          look_at(cairn::retract(motion.mean, cairn::Vector<3>(reach * x, reach * y, turn * a)));
+        for (int x = -nx; x <= nx; ++x) {
+          const cairn::SE2 pose =
+              cairn::retract(motion.mean, cairn::Vector<3>(reach * x, reach * y, turn * a));
+          first.add({ranking.worth(pose), pose});
+        }
+    }
+    cairn::SE2 best = motion.mean;
+    double most = cairn::log_likelihood(map.grid, looked.field, points, best, wide);
+    for (const Ranked& each : first.all) {
+      const double l = cairn::log_likelihood(map.grid, looked.field, points, each.pose, wide);
+      if (l > most) {
+        most = l;
+        best = each.pose;
+      }
+    }
     return best;
   }
+
+  struct Ranked {
+    float worth;
+    cairn::SE2 pose;
+  };
+  /// The first of many, the best first; of equals those that came first.
+  struct FirstFew {
+    static constexpr std::size_t most = 12;
+    std::vector<Ranked> all;
+    void add(const Ranked& next) {
+      if (all.size() == most && !(next.worth > all.back().worth)) return;
+      if (all.size() == most) all.pop_back();
+      const auto place = std::ranges::upper_bound(all, next.worth, std::ranges::greater{}, &Ranked::worth);
+      all.insert(place, next);
+    }
+  };
+  /// What poses are worth by the rings of obstacles that the points fall into.
+  class Ranking {
+  public:
+    Ranking(const cairn::OccupancyGrid& grid, const cairn::EndPointModel& model,
+            const std::vector<cairn::ScanPoint>& points)
+        : geometry_(grid.geometry()), rings_(grid.cells()), points_(points) {
+      using Rings = cairn::ObstacleRings<cairn::OccupancyCell>;
+      worth_[0] = static_cast<float>(std::log(model.outliers));
+      for (std::size_t k = 0; k < Rings::rings; ++k) {
+        const double d = Rings::distance[k] * geometry_.cell_size / model.sigma;
+        worth_[Rings::rings - k] =
+            static_cast<float>(std::log((1 - model.outliers) * std::exp(-0.5 * d * d) + model.outliers));
+      }
+      turned_.resize(points.size());
+    }
+    /// The heading of the poses that follow.
+    void turn(double angle) {
+      const double scale = 1 / geometry_.cell_size, c = scale * std::cos(angle), s = scale * std::sin(angle);
+      for (std::size_t i = 0; i < points_.size(); ++i)
+        turned_[i] = {c * points_[i].x - s * points_[i].y, s * points_[i].x + c * points_[i].y};
+    }
+    [[nodiscard]] float worth(const cairn::SE2& pose) {
+      const double column = geometry_.column_of(pose.x()), row = geometry_.row_of(pose.y());
+      float sum = 0;
+      for (const cairn::ScanPoint& p : turned_) {
+        const double x = column + p.x, y = row + p.y;
+        const bool has_cell = std::abs(x) < cairn::farthest_cell && std::abs(y) < cairn::farthest_cell;
+        sum += worth_[has_cell ? static_cast<std::size_t>(rings_.around({whole(x), whole(y)})) : 0];
+      }
+      return sum;
+    }
+
+  private:
+    [[nodiscard]] static std::int32_t whole(double x) noexcept {
+      const auto towards_zero = static_cast<std::int32_t>(x);
+      return towards_zero - (x < towards_zero ? 1 : 0);
+    }
+    cairn::GridGeometry geometry_;
+    cairn::ObstacleRings<cairn::OccupancyCell> rings_;
+    const std::vector<cairn::ScanPoint>& points_;
+    std::vector<cairn::ScanPoint> turned_;  // [cells]
+    std::array<float, 4> worth_{};          // by the number of rings around
+  };
 };
 
 }  // namespace grid_slam

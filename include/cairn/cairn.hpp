@@ -87,6 +87,7 @@
 #include <cairn/grid/ancestry.hpp>
 #include <cairn/grid/distance_field.hpp>
 #include <cairn/grid/height_cell.hpp>
+#include <cairn/grid/obstacle_rings.hpp>
 #include <cairn/grid/ray.hpp>
 #include <cairn/grid/shared_tiles.hpp>
 #include <cairn/grid/tile.hpp>

@@ -123,36 +123,53 @@ TEST_SUITE("grid_slam/mapper") {
   }
 
   TEST_CASE(
-      "mapper: of motions that explain a scan each is drawn by its share times what counts of its evidence") {
+      "mapper: of motions that explain a scan each is drawn by its share times its evidence, of which a rare "
+      "one's gain counts in part") {
     const Seen seen = seen_in_the_corridor();
-    const std::array<double, 2> share{0.7, 0.3};
-    RegimeMotion<SE2> motion;
+    std::array<Gaussian<SE2>, 2> motions;
     std::array<double, 2> by_lattice{};
     const std::array<Vector<3>, 2> off{Vector<3>(0.07, -0.06, 0.04), Vector<3>(0.01, 0.01, 0)};
     for (std::size_t k = 0; k < 2; ++k) {
-      motion.modes.push_back({k, share[k], moved_by(seen, off[k])});
-      by_lattice[k] = evidence(seen, motion.modes[k].motion).log_integral;
+      motions[k] = moved_by(seen, off[k]);
+      by_lattice[k] = evidence(seen, motions[k]).log_integral;
     }
     const double gain = by_lattice[1] - by_lattice[0];
     CAPTURE(gain);
     REQUIRE(gain > 3);  // else all of it or a part makes no difference
-    for (const double counts : {1.0, 0.12}) {
-      CAPTURE(counts);
-      const double odds = share[1] / share[0] * std::exp(counts * gain);
+    REQUIRE(gain < 10);
+    const auto compare = [&](double rare, double counts, bool likely) {
+      RegimeMotion<SE2> motion;
+      motion.modes.push_back({0, 1 - rare, motions[0]});
+      motion.modes.push_back({1, rare, motions[1]});
       FromMatch proposal;
       proposal.evidence_share = counts;
+      proposal.explained_badly = 2;  // so that the rare one is tried
+      proposal.explained_well = proposal.rare_explained = 0;
+      proposal.rare_gain = proposal.rare_change_gain = 0;
+      proposal.likely_share = 0.03;
+      const double odds = rare / (1 - rare) * std::exp((likely ? 1 : counts) * gain);
+      // The weights' logarithms times `counts` are relative to the best of the likely motions.
+      const double best = by_lattice[likely ? 1 : 0];
+      const double mean = (1 - rare) * (1 + odds) * (likely ? std::exp(-gain) : 1);
       Random random(cairn_test::seed());
       constexpr int draws = 2000;
       double second = 0, sum = 0;
       for (int i = 0; i < draws; ++i) {
         const auto p = proposal(seen.map, motion, seen.points, random);
         second += p.regime == 1 ? 1.0 / draws : 0;
-        sum += std::exp(counts * (p.log_weight - by_lattice[0])) / draws;
+        sum += std::exp(counts * (p.log_weight - best)) / draws;
       }
       const double expected = odds / (1 + odds);
+      CAPTURE(rare);
+      CAPTURE(counts);
+      CAPTURE(expected);
       // Four deviations of so many draws, and a Gaussian instead of the likelihood's shape.
       CHECK(std::abs(second - expected) < 4 * std::sqrt(expected * (1 - expected) / draws) + 0.01);
-      CHECK(sum == doctest::Approx(share[0] * (1 + odds)).epsilon(0.05));
+      CHECK(sum == doctest::Approx(mean).epsilon(0.05));
+    };
+    for (const double counts : {1.0, 0.12}) {
+      compare(0.05, counts, true);
+      compare(0.02, counts, false);
     }
   }
 
