@@ -151,8 +151,8 @@ int main(int argc, char** argv) {
   const std::string name = "grid_slam";
   Options options;
   CLI::App app{"Maps a floor from laser scans and odometry: a particle filter over occupancy grids."};
-  auto* log =
-      app.add_option("--log", options.log, "a CARMEN log (FLASER, ROBOTLASER1 or RAWLASER1 lines) or one of DP-SLAM");
+  auto* log = app.add_option("--log", options.log,
+                             "a CARMEN log (FLASER, ROBOTLASER1 or RAWLASER1 lines) or one of DP-SLAM");
   app.add_flag("--simulate", options.simulate, "a rendered drive around a corridor, also without --log")
       ->excludes(log);
   app.add_option("--map", options.map,

@@ -78,10 +78,15 @@ void parts(Archive& archive, Loop& l) {
   archive(l.first, l.last, l.T_first_last, l.covariance);
 }
 
+template <class Archive>
+void parts(Archive& archive, Asked& a) {
+  archive(a.error, a.at, a.since, a.whole);
+}
+
 namespace {
 
 constexpr std::string_view kind = "cairngrd";
-constexpr std::uint64_t version = 3;
+constexpr std::uint64_t version = 4;
 
 /// Grids that share tiles: every tile once, and for each grid the numbers of its own.
 template <class Cell>
@@ -195,7 +200,7 @@ template <class Archive>
 void Mapper::plain_parts(Archive& archive, Mapper& m) {
   archive(m.steps_, m.points_, m.travelled_, m.scans_, m.loops_);
   archive(m.motion_.distance, m.motion_.angle, m.motion_.stood, m.delay_);
-  archive(m.looked_, m.asked_, m.asked_at_);
+  archive(m.looked_, m.asked_);
 }
 
 void Mapper::expect_sound(const Reader& reader) const {
@@ -206,6 +211,9 @@ void Mapper::expect_sound(const Reader& reader) const {
     reader.refuse("the steps are not in the order of the scans");
   if (!growing(travelled_) || !(motion_.distance >= 0 && motion_.angle >= 0))
     reader.refuse("the way travelled is not one");
+  if (!delay_.is_distribution()) reader.refuse("the shares of the scans' delays do not sum to one");
+  if (asked_ && !(asked_->since >= 0 && asked_->since <= asked_->at))
+    reader.refuse("a look came before its first");
   for (const Loop& loop : loops_) {
     if (loop.first >= loop.last || loop.last >= travelled_.size())
       reader.refuse("a loop joins poses that there are not");

@@ -295,19 +295,33 @@ void Mapper::look_for_loop() {
   const auto path = belief_->path(belief_->best());
   const std::vector<SE2> poses = poses_on(path);
   const ChainCovariance uncertain(drawn_steps(path));
+  std::optional<Look> part;
   for (const std::size_t near : old_places(poses, uncertain)) {
     const LoopWindow window = loop_window(uncertain.between(near, poses.size() - 1));
     // A wide look costs more, and one of them is enough to make the next ones narrow.
     if (!(std::floor(now / window.every) > std::floor(before / window.every))) continue;
-    const std::optional<Loop> loop = measured_loop(poses, near, window);
-    if (!loop) continue;
-    const SE2 seen = poses[loop->first].inverse() * poses[loop->last];
-    const Vector<3> error = cairn::local(seen, loop->T_first_last);
-    const cairn::Cholesky<3> root(Matrix<3>(uncertain.between(loop->first, loop->last) + loop->covariance));
-    if (!root.good() || root.whiten(error).squaredNorm() > options.gate) continue;
-    take_loop(*loop, error, window.every);
-    return;
+    const std::optional<Look> look = looked_at(poses, uncertain, near, window);
+    if (!look) continue;
+    if (look->whole) return take_loop(*look);
+    if (!part) part = look;
   }
+  if (part) take_loop(*part);
+}
+
+std::optional<Mapper::Look> Mapper::looked_at(const std::vector<SE2>& poses, const ChainCovariance& uncertain,
+                                              std::size_t near, const LoopWindow& window) const {
+  const auto found = measured_loop(poses, near, window);
+  if (!found) return std::nullopt;
+  const Loop& loop = found->loop;
+  const SE2 seen = poses[loop.first].inverse() * poses[loop.last];
+  const Vector<3> error = cairn::local(seen, loop.T_first_last);
+  const cairn::Cholesky<3> root(Matrix<3>(uncertain.between(loop.first, loop.last) + loop.covariance));
+  if (!root.good() || root.whiten(error).squaredNorm() > options_.loops.gate) return std::nullopt;
+  const double enough = options_.loops.enough_inliers;
+  const bool far_off = error.head<2>().norm() > options_.loops.bridged;
+  const bool whole = found->inliers >= enough && (far_off || found->matched >= enough);
+  if (!whole && !far_off) return std::nullopt;
+  return Look{loop, whole, error, window.every};
 }
 
 Mapper::LoopWindow Mapper::loop_window(const Matrix<3>& covariance) const {
@@ -317,23 +331,30 @@ Mapper::LoopWindow Mapper::loop_window(const Matrix<3>& covariance) const {
   return {reach, turn, std::max(options.check_every, options.check_share * reach)};
 }
 
-void Mapper::take_loop(const Loop& loop, const Vector<3>& error, double every) {
+void Mapper::take_loop(const Look& look) {
   const LoopOptions& options = options_.loops;
-  const bool far = error.head<2>().norm() > options.moved || std::abs(error(2)) > options.turned;
+  const bool far = look.error.head<2>().norm() > options.moved || std::abs(look.error(2)) > options.turned;
   if (far) {
-    // One look may be deceived by places that look alike; two that ask for the same are believed.
-    const bool again = asked_ && travelled_.back() - asked_at_ < 2.5 * every &&
-                       (error - *asked_).head<2>().norm() < 0.1 + 0.2 * error.head<2>().norm() &&
-                       std::abs(error(2) - (*asked_)(2)) < 0.03;
-    asked_ = error;
-    asked_at_ = travelled_.back();
-    if (!again) return;
-    asked_.reset();
+    if (!believed(look)) return;
   } else if (!loops_.empty() && travelled_.back() - travelled_[loops_.back().last] < options.spacing) {
     return;
   }
-  loops_.push_back(loop);
+  loops_.push_back(look.loop);
   if (far) move_paths();
+}
+
+/// One look may be deceived by places that look alike. Two that ask for the same are believed; where they
+/// explain but a part, those of so long a path that the last has no scan of the first.
+bool Mapper::believed(const Look& look) {
+  const double now = travelled_.back();
+  const bool again =
+      asked_ && now - asked_->at < 2.5 * look.every &&
+      (look.error - asked_->error).head<2>().norm() < 0.1 + 0.2 * look.error.head<2>().norm() &&
+      std::abs(look.error(2) - asked_->error(2)) < 0.03;
+  const bool enough = again && ((look.whole && asked_->whole) || now - asked_->since >= options_.loops.query);
+  asked_ = Asked{look.error, now, again ? asked_->since : now, look.whole};
+  if (enough) asked_.reset();
+  return enough;
 }
 
 std::vector<std::size_t> Mapper::old_places(const std::vector<SE2>& poses,
@@ -364,8 +385,8 @@ std::vector<std::size_t> Mapper::old_places(const std::vector<SE2>& poses,
   return near;
 }
 
-std::optional<Loop> Mapper::measured_loop(const std::vector<SE2>& poses, std::size_t near,
-                                          const LoopWindow& window) const {
+std::optional<Mapper::MeasuredLoop> Mapper::measured_loop(const std::vector<SE2>& poses, std::size_t near,
+                                                          const LoopWindow& window) const {
   const LoopOptions& options = options_.loops;
   const auto by_path = [&](double at) {
     return static_cast<std::size_t>(std::ranges::lower_bound(travelled_, at) - travelled_.begin());
@@ -394,7 +415,8 @@ std::optional<Loop> Mapper::measured_loop(const std::vector<SE2>& poses, std::si
   const cairn::MatchOptions fine{.model = options_.model};
   const auto result = cairn::match(grid, seen, found->pose, found->pose, Matrix<3>::Zero(), fine);
   const cairn::Cholesky<3> information(result.information);
-  if (result.matched < options.enough_inliers || !information.good()) return std::nullopt;
+  const double least = options.enough_of_many;
+  if (result.inliers < least || result.matched < least || !information.good()) return std::nullopt;
   const SE2 shift = now.inverse() * found->pose;
   if (shift.translation().norm() > options.moved || std::abs(shift.angle()) > options.turned) {
     // In a corridor whose doors all look alike the best place is one of many.
@@ -409,7 +431,9 @@ std::optional<Loop> Mapper::measured_loop(const std::vector<SE2>& poses, std::si
   for (std::size_t i = begin; i < end; ++i)
     if (distance(i) < distance(first)) first = i;
   const Matrix<3> floor = Vector<3>(1e-4, 1e-4, 1e-5).asDiagonal();
-  return Loop{first, last, poses[first].inverse() * result.pose, information.inverse() + floor};
+  return MeasuredLoop{{first, last, poses[first].inverse() * result.pose, information.inverse() + floor},
+                      result.inliers,
+                      result.matched};
 }
 
 void Mapper::move_paths() {

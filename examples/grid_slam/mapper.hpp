@@ -48,7 +48,12 @@ struct LoopOptions {
   double submap = 4;          ///< [m] of path to either side of the old place
   double query = 3;           ///< [m] of path before the new one
   double enough_score = 0.5;  ///< of the correlation
+  /// Of the points that fall where the old place was seen; and of all points, where the error is less than
+  /// matching bridges: farther off, the robot may see what it did not see then.
   double enough_inliers = 0.75;
+  double bridged = 0.2;  ///< [m]
+  /// Of both, where the looks of a whole `query` agree that the path is farther off.
+  double enough_of_many = 0.5;
   double gate = 25;           ///< squared Mahalanobis distance of a loop's error in the path's covariance
   double moved = 0.08;        ///< [m] an error from which on the paths are moved
   double turned = 0.01;       ///< [rad] the same of the heading
@@ -105,6 +110,13 @@ class Reader;
 struct PossiblePlace {
   cairn::SE2 pose;
   double share = 0;
+};
+
+/// The last look that asked for the paths to be moved.
+struct Asked {
+  cairn::Vector<3> error;
+  double at = 0, since = 0;  ///< [m] travelled there, and at the first of those before that agree with it
+  bool whole = false;
 };
 
 /// Takes scans one by one.
@@ -177,9 +189,25 @@ private:
     double every;        // [m] of path between two looks
   };
   [[nodiscard]] LoopWindow loop_window(const cairn::Matrix<3>& covariance) const;
-  void take_loop(const Loop& loop, const cairn::Vector<3>& error, double every);
-  [[nodiscard]] std::optional<Loop> measured_loop(const std::vector<cairn::SE2>& poses, std::size_t near,
-                                                  const LoopWindow& window) const;
+  /// A loop, and the shares of points that the old place explains: of those where it was seen, and of all.
+  struct MeasuredLoop {
+    Loop loop;
+    double inliers, matched;
+  };
+  /// A loop, and how far the path between is off by it.
+  struct Look {
+    Loop loop;
+    bool whole;  // else the old place explains only a part of what the robot sees
+    cairn::Vector<3> error;
+    double every;  // [m] of path between two such looks
+  };
+  void take_loop(const Look& look);
+  [[nodiscard]] bool believed(const Look& look);
+  [[nodiscard]] std::optional<Look> looked_at(const std::vector<cairn::SE2>& poses,
+                                              const ChainCovariance& uncertain, std::size_t near,
+                                              const LoopWindow& window) const;
+  [[nodiscard]] std::optional<MeasuredLoop> measured_loop(const std::vector<cairn::SE2>& poses,
+                                                          std::size_t near, const LoopWindow& window) const;
   void move_paths();
   [[nodiscard]] OccupancyMap empty_map() const;
 
@@ -196,9 +224,8 @@ private:
   std::vector<Loop> loops_;
   Motion motion_;
   ScanDelay delay_;
-  double looked_ = 0;                      // travelled at the last look for a loop
-  std::optional<cairn::Vector<3>> asked_;  // error of the last loop that asked for a move
-  double asked_at_ = 0;
+  double looked_ = 0;  // travelled at the last look for a loop
+  std::optional<Asked> asked_;
 };
 
 }  // namespace grid_slam

@@ -78,6 +78,10 @@ void ScanDelay::learn(std::span<const cairn::StampedScan> scans, std::size_t fro
   sum_up();
 }
 
+bool ScanDelay::is_distribution() const {
+  return std::abs(cairn::log_sum_exp(log_weights_)) < 1e-6;
+}
+
 void ScanDelay::normalise() {
   const double total = cairn::log_sum_exp(log_weights_);
   for (double& each : log_weights_) each -= total;

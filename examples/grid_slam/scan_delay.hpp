@@ -49,6 +49,9 @@ public:
   void learn(std::span<const cairn::StampedScan> scans, std::size_t from, std::size_t to, double turn,
              double sigma);
 
+  /// Whether the shares of all delays sum to one, as those of a file need not.
+  [[nodiscard]] bool is_distribution() const;
+
   template <class Archive>
   friend void parts(Archive& archive, ScanDelay& d) {
     for (double& each : d.log_weights_) archive(each);

@@ -127,7 +127,7 @@ TEST_SUITE("grid_slam/map_file") {
       char bytes[8];
       std::memcpy(bytes, &values[round % 7], 8);
       for (std::size_t i = 0; i < numbers.size(); ++i) changed.put(i - at < 8 ? bytes[i - at] : numbers[i]);
-      folder.put("changed", changed.file("cairngrd", 3));
+      folder.put("changed", changed.file("cairngrd", 4));
       const std::string words = cairn_test::message_of([&] {
         Mapper loaded = Mapper::loaded(folder / "changed");
         loaded.save(folder / "again");
@@ -138,6 +138,32 @@ TEST_SUITE("grid_slam/map_file") {
       CHECK(words.find("changed: ") != std::string::npos);
     }
     CHECK(refused > 0);
+  }
+
+  TEST_CASE("map_file: shares of the delays that do not sum to one are refused in words") {
+    const cairn_test::Folder folder;
+    Mapper mapper({.particles = 1});
+    mapper.add(simulated_drive({.seed = 2}).log.scans.front());
+    mapper.save(folder / "map");
+    std::string numbers = cairn::read_file(folder / "map").substr(32);
+    // They stand before the two numbers on looks for loops that end the file.
+    const std::size_t at = numbers.size() - 1 - 8 - 8 * ScanDelay::count;
+    double share = 0, sum = 0;
+    for (std::size_t k = 0; k < ScanDelay::count; ++k) {
+      std::memcpy(&share, numbers.data() + at + 8 * k, 8);
+      sum += std::exp(share);
+    }
+    REQUIRE(sum == doctest::Approx(1));
+    const auto words = [&] {
+      cairn::BinaryWriter out;
+      for (const char c : numbers) out.put(c);
+      folder.put("map", out.file("cairngrd", 4));
+      return cairn_test::message_of([&] { static_cast<void>(Mapper::loaded(folder / "map")); });
+    };
+    CHECK(words().empty());
+    const double one = 0;
+    std::memcpy(numbers.data() + at + 8 * 5, &one, 8);
+    CHECK(words().find("do not sum to one") != std::string::npos);
   }
 
   TEST_CASE("map_file: of a place that looks like another both are named, with their shares") {

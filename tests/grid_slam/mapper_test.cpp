@@ -5,16 +5,21 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
+#include <cairn/eval/relations.hpp>
+#include <cairn/io/carmen.hpp>
 
 #include "floor_plan.hpp"
 #include "occupancy_map.hpp"
 #include "run.hpp"
+#include "support/data.hpp"
 #include "support/folder.hpp"
 #include "support/random.hpp"
 
@@ -240,6 +245,28 @@ TEST_SUITE("grid_slam/mapper") {
     };
     CHECK(off(r.odometry) > 8);
     CHECK(off(r.means) < 0.15);
+  }
+
+  TEST_CASE("mapper: Intel's first lap closes also where the start was seen from one side only") {
+    // What the robot sees when it is back is more than it saw when it left: the loop explains two thirds of
+    // the points. Missed, odometry's error of the lap, half a metre, ends up in the last three metres of the
+    // path.
+    const auto folder = cairn_test::real_data("laser_2d");
+    if (!folder) return;
+    const cairn_test::Folder unpacked;
+    const std::string log = (unpacked / "log").string();
+    const std::string command =
+        "bzip2 -dc \"" + (*folder / "intel.clf.bz2").string() + "\" | head -n 5900 >\"" + log + "\"";
+    if (std::system(command.c_str()) != 0) {  // NOLINT(cert-env33-c): our own command
+      MESSAGE("skipped: no bzip2");
+      return;
+    }
+    const auto results =
+        run(read_carmen(log), {.seed = 3, .threads = 2}, read_relations(*folder / "intel.relations"));
+    REQUIRE(results.of_drawn);
+    CHECK(results.of_drawn->count > 200);
+    CHECK(results.of_drawn->mean < 0.023);
+    CHECK(results.of_drawn->largest < 0.15);  // 0.28 where the loop is missed
   }
 
   TEST_CASE("mapper: options out of range are refused in words") {
