@@ -113,6 +113,11 @@ static_assert(!HasRowsOf<std::vector<double>&>);
 static_assert(!std::is_constructible_v<cairn::Rows<double>, const Eigen::MatrixX3d&, std::size_t>);
 static_assert(!std::is_constructible_v<cairn::Rows<double>, const Eigen::MatrixX3d&>);
 
+static_assert(std::is_constructible_v<cairn::Rows<float>, const std::vector<float>&, std::size_t>);
+static_assert(std::is_constructible_v<cairn::Rows<float>, std::span<const float>, std::size_t>);
+static_assert(!std::is_constructible_v<cairn::Rows<float>, std::vector<float>, std::size_t>, "would be gone");
+static_assert(!std::is_constructible_v<cairn::Rows<float>, std::array<float, 3>, std::size_t>);
+
 struct FirstAndLast {
   double operator()(const Foreign& point, std::size_t axis) const { return axis == 0 ? point.x : point.z; }
 };

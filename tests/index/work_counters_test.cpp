@@ -70,7 +70,8 @@ Cost cost_of_splits() {
 
 Tree tree_of(const char* shape) {
   cairn::Random random(1);
-  return Tree(cairn::Rows<float>(cairn_test::make_points<float>(shape, count, 3, random), 3));
+  const std::vector<float> numbers = cairn_test::make_points<float>(shape, count, 3, random);
+  return Tree(cairn::Rows<float>(numbers, 3));
 }
 
 struct Row {

@@ -121,6 +121,7 @@ inline std::optional<std::pair<SE3, double>> alignment_of(std::span<const PosePa
   result.rotation = error_statistics(angles);
   return result;
 }
+void absolute_error(const Trajectory&, const Trajectory&, AlignBy = {}) = delete;  ///< associate() them
 
 /// In what a relative error's distance between the two poses is counted.
 enum class DeltaUnit { frames, metres };

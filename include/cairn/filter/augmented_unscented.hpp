@@ -122,7 +122,7 @@ struct AugmentedUnscented {
   /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite, a P or Q that is no
   /// covariance.
   template <class F, class U = typename F::Control>
-    requires(AnyProcess<F> || detail::explain_sizes<F>)
+    requires(AnyProcess<F> || detail::explain_process<F>)
   Status predict(Gaussian<typename F::State>& belief, const F& process, double dt,
                  const U& control = detail::no_control<U>()) const {
     using S = ScalarOf<typename F::State>;
@@ -135,7 +135,7 @@ struct AugmentedUnscented {
 
   /// Takes in the measurement z, or refuses it and leaves the belief as it was.
   template <class H, class T = typename H::Measurement>
-    requires(AnyMeasurement<H> || detail::explain_sizes<H>)
+    requires(AnyMeasurement<H> || detail::explain_sensor<H>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
       Gaussian<typename H::State>& belief, const H& sensor, const T& z) const {
     using X = typename H::State;
@@ -162,7 +162,8 @@ struct AugmentedUnscented {
   /// One predict and one update with points drawn once. Refused: as either of them; the belief then stays
   /// where it was before the prediction. No point carries stabilising noise: it has to be zero here.
   template <class F, class H, class U = typename F::Control, class T = typename H::Measurement>
-    requires(AnyProcess<F> || detail::explain_sizes<F>) && (AnyMeasurement<H> || detail::explain_sizes<H>) &&
+    requires(AnyProcess<F> || detail::explain_process<F>) &&
+            (AnyMeasurement<H> || detail::explain_sensor<H>) &&
             std::same_as<typename F::State, typename H::State>
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> step(
       Gaussian<typename H::State>& belief, const F& process, double dt, const H& sensor, const T& z,

@@ -87,7 +87,7 @@ struct EnsembleKalman {
 
   /// Moves every member by dt and a draw of the noise.
   template <class F, class U = typename F::Control>
-    requires(AnyProcess<F> || detail::explain_sizes<F>)
+    requires(AnyProcess<F> || detail::explain_process<F>)
   Status predict(Ensemble<typename F::State>& belief, const F& process, double dt, Random& random,
                  const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
@@ -116,7 +116,7 @@ struct EnsembleKalman {
   /// Takes in z, or refuses it and leaves every member; the noise is that at the mean. `random` is drawn from
   /// by the perturbed form alone. O(N m (n + m)).
   template <class H, class V = typename H::Measurement>
-    requires(MeasurementModel<H> || detail::explain_sizes<H>)
+    requires(MeasurementModel<H> || detail::explain_sensor<H>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
       Ensemble<typename H::State>& belief, const H& sensor, const V& z, Random& random) const {
     using X = typename H::State;

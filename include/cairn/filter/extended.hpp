@@ -45,7 +45,8 @@ struct Extended {
 
   /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite.
   template <class F, class U = typename F::Control>
-    requires(LinearisedProcess<F> || detail::explain_sizes<F> || detail::explain_jacobian<F, ProcessModel<F>>)
+    requires(LinearisedProcess<F> || detail::explain_process<F> ||
+             detail::explain_jacobian<F, ProcessModel<F>>)
   Status predict(Gaussian<typename F::State>& belief, const F& process, double dt,
                  const U& control = detail::no_control<U>()) const {
     return detail::predict_linearised(belief, process, control, dt, fading, stabilising_noise);
@@ -55,7 +56,7 @@ struct Extended {
   /// before the update, whatever the iterations. Where R is singular there is no cost to compare, and
   /// iterations take full steps.
   template <class H, class V = typename H::Measurement>
-    requires(LinearisedMeasurement<H> || detail::explain_sizes<H> ||
+    requires(LinearisedMeasurement<H> || detail::explain_sensor<H> ||
              detail::explain_jacobian<H, MeasurementModel<H>>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
       Gaussian<typename H::State>& belief, const H& sensor, const V& z) const {

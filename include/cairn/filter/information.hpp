@@ -280,7 +280,8 @@ struct InformationFilter {
   /// Moves the belief by one step of dt. The mean of what is known is moved by the process first, so the
   /// point of linearisation follows the estimate. Refused: a singular F, a Q that is no covariance.
   template <class F, class U = typename F::Control>
-    requires(LinearisedProcess<F> || detail::explain_sizes<F>)
+    requires(LinearisedProcess<F> || detail::explain_process<F> ||
+             detail::explain_jacobian<F, ProcessModel<F>>)
   Status predict(InformationBelief<typename F::State>& belief, const F& process, double dt,
                  const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
@@ -316,7 +317,8 @@ struct InformationFilter {
 
   /// Adds the information of the measurement z, linearised at the belief's point. O(M^2 N + M N^2).
   template <class H, class V = typename H::Measurement>
-    requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
+    requires(LinearisedMeasurement<H> || detail::explain_sensor<H> ||
+             detail::explain_jacobian<H, MeasurementModel<H>>)
   UpdateResult update(InformationBelief<typename H::State>& belief, const H& sensor, const V& z) const {
     using X = typename H::State;
     using S = ScalarOf<X>;

@@ -114,7 +114,7 @@ struct Interacting {
   /// `switching` that do not sum to 1 (bad_option), probabilities that are none (see ModeBelief::weighed).
   template <Manifold X, class Mode, class... F,
             class U = typename std::tuple_element_t<0, std::tuple<F...>>::Control>
-    requires(sizeof...(F) == R)
+    requires(sizeof...(F) == R || detail::explain_modes<R, sizeof...(F)>)
   Status predict(ModeBelief<X, R, Mode>& belief, const std::tuple<F...>& processes, double dt,
                  const U& control = detail::no_control<U>()) const {
     if (!stochastic()) return Status::bad_option;
@@ -152,7 +152,7 @@ struct Interacting {
   /// Every mode takes in z; a mode that refuses keeps its belief and loses its weight. Refused by all: the
   /// first mode's reason, and the belief as it was.
   template <class Mode, class H, class V = typename H::Measurement>
-    requires(MeasurementModel<H> || detail::explain_sizes<H>)
+    requires(MeasurementModel<H> || detail::explain_sensor<H>)
   UpdateResult update(ModeBelief<typename H::State, R, Mode>& belief, const H& sensor, const V& z) const {
     if (!belief.fits()) return Status::size_mismatch;
     if (const Status status = belief.weighed(); status != Status::accepted) return status;

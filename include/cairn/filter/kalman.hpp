@@ -33,7 +33,7 @@ struct Kalman {
 
   /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite.
   template <class F, class U = typename F::Control>
-    requires(LinearProcess<F> || detail::explain_sizes<F> || detail::explain_linear<F, ProcessModel<F>>)
+    requires(LinearProcess<F> || detail::explain_process<F> || detail::explain_linear<F, ProcessModel<F>>)
   Status predict(Gaussian<typename F::State>& belief, const F& process, double dt,
                  const U& control = detail::no_control<U>()) const {
     return detail::predict_linearised(belief, process, control, dt, fading, stabilising_noise);
@@ -41,7 +41,7 @@ struct Kalman {
 
   /// Takes in the measurement z, or refuses it and leaves the belief as it was.
   template <class H, class V = typename H::Measurement>
-    requires(LinearMeasurement<H> || detail::explain_sizes<H> ||
+    requires(LinearMeasurement<H> || detail::explain_sensor<H> ||
              detail::explain_linear<H, MeasurementModel<H>>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
       Gaussian<typename H::State>& belief, const H& sensor, const V& z) const {

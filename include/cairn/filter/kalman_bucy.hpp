@@ -87,7 +87,7 @@ struct KalmanBucy {
   /// Moves the belief by dt while the sensor reports z, held constant; sensor.noise() is a spectral density.
   template <class F, class H, class U = typename F::Control, class V = typename H::Measurement>
     requires(ContinuousProcess<F> || detail::explain_sizes<F>) &&
-            (LinearisedMeasurement<H> || detail::explain_sizes<H>)
+            (LinearisedMeasurement<H> || detail::explain_sensor<H>)
   Status filter(Gaussian<typename F::State>& belief, const F& process, const H& sensor, const V& z, double dt,
                 const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
@@ -118,7 +118,7 @@ struct KalmanBucy {
   /// definite for the estimate to move.
   template <class F, class H, class U = typename F::Control, class V = typename H::Measurement>
     requires(ContinuousProcess<F> || detail::explain_sizes<F>) &&
-            (LinearisedMeasurement<H> || detail::explain_sizes<H>)
+            (LinearisedMeasurement<H> || detail::explain_sensor<H>)
   Status filter(InformationBelief<typename F::State>& belief, const F& process, const H& sensor, const V& z,
                 double dt, const U& control = detail::no_control<U>()) const {
     using X = typename F::State;

@@ -161,8 +161,8 @@ Status smooth_record(const Filter& filter, const NoiseRecord<F, H>& record,
 /// record. not_converged: `rounds` are spent (the result is usable); depleted: nothing to learn from;
 /// size_mismatch: a size of the record's and the models' does not fit. O(rounds * steps).
 template <class Filter = Kalman, class F, class H>
-  requires(LinearisedProcess<F> || detail::explain_sizes<F>) &&
-          (LinearisedMeasurement<H> || detail::explain_sizes<H>)
+  requires(LinearisedProcess<F> || detail::explain_process<F>) &&
+          (LinearisedMeasurement<H> || detail::explain_sensor<H>)
 [[nodiscard]] NoiseFit<F, H> fit_noise(const NoiseRecord<F, H>& record, const F& process, const H& sensor,
                                        const NoiseFitting& options = {}, const Filter& filter = {}) {
   using Q = CovarianceOf<typename F::State>;

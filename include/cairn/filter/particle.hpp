@@ -273,7 +273,7 @@ struct ParticleFilter {
 
   /// Moves every particle and draws its noise.
   template <class F, class U = typename F::Control>
-    requires(ProcessModel<F> || detail::explain_sizes<F>)
+    requires(ProcessModel<F> || detail::explain_process<F>)
   Status predict(Particles<typename F::State>& belief, const F& process, double dt, Random& random,
                  const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
@@ -298,7 +298,7 @@ struct ParticleFilter {
 
   /// Weighs every particle by the Gaussian likelihood of z, and resamples where the weights have degenerated.
   template <class H, class V = typename H::Measurement>
-    requires(MeasurementModel<H> || detail::explain_sizes<H>)
+    requires(MeasurementModel<H> || detail::explain_sensor<H>)
   UpdateResult update(Particles<typename H::State>& belief, const H& sensor, const V& z,
                       Random& random) const {
     using S = ScalarOf<typename H::State>;

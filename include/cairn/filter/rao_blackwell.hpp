@@ -78,7 +78,7 @@ struct RaoBlackwell {
 
   /// Moves every sampled state and draws its noise; the parts stay.
   template <class F, Manifold Part, class U = typename F::Control>
-    requires(ProcessModel<F> || detail::explain_sizes<F>)
+    requires(ProcessModel<F> || detail::explain_process<F>)
   Status predict(ConditionalParticles<typename F::State, Part>& belief, const F& process, double dt,
                  Random& random, const U& control = detail::no_control<U>()) const {
     Particles<typename F::State> states;

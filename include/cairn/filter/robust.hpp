@@ -74,7 +74,7 @@ struct Robust {
 
   /// That of the filter.
   template <Belief B, class F, class U = typename F::Control>
-    requires(ProcessModel<F> || detail::explain_sizes<F>)
+    requires(ProcessModel<F> || detail::explain_process<F>)
   Status predict(B& belief, const F& process, double dt, const U& control = detail::no_control<U>()) const {
     return filter.predict(belief, process, dt, control);
   }
@@ -82,7 +82,7 @@ struct Robust {
   /// Like filter.update; where R was raised the innovation is that of the raised R. not_positive_definite
   /// where no factor would do, as for R = 0.
   template <class H, class V = typename H::Measurement>
-    requires(MeasurementModel<H> || detail::explain_sizes<H>)
+    requires(MeasurementModel<H> || detail::explain_sensor<H>)
   auto update(cairn::BeliefOf<Filter, typename H::State>& belief, const H& sensor, const V& z) const {
     using S = ScalarOf<typename H::State>;
     using B = cairn::BeliefOf<Filter, typename H::State>;
@@ -185,14 +185,14 @@ struct Huber {
 
   /// That of the filter.
   template <Belief B, class F, class U = typename F::Control>
-    requires(ProcessModel<F> || detail::explain_sizes<F>)
+    requires(ProcessModel<F> || detail::explain_process<F>)
   Status predict(B& belief, const F& process, double dt, const U& control = detail::no_control<U>()) const {
     return filter.predict(belief, process, dt, control);
   }
 
   /// Like filter.update; the innovation and the covariance are those of the weighed R.
   template <class H, class V = typename H::Measurement>
-    requires(MeasurementModel<H> || detail::explain_sizes<H>)
+    requires(MeasurementModel<H> || detail::explain_sensor<H>)
   auto update(cairn::BeliefOf<Filter, typename H::State>& belief, const H& sensor, const V& z) const {
     if (!(threshold > 0.0)) return detail::refused_as<H>(Status::bad_option);
     const auto weight = [&](double t) { return t > threshold ? threshold / t : 1.0; };
@@ -210,14 +210,14 @@ struct StudentT {
 
   /// That of the filter.
   template <Belief B, class F, class U = typename F::Control>
-    requires(ProcessModel<F> || detail::explain_sizes<F>)
+    requires(ProcessModel<F> || detail::explain_process<F>)
   Status predict(B& belief, const F& process, double dt, const U& control = detail::no_control<U>()) const {
     return filter.predict(belief, process, dt, control);
   }
 
   /// Like filter.update; the innovation and the covariance are those of the weighed R.
   template <class H, class V = typename H::Measurement>
-    requires(MeasurementModel<H> || detail::explain_sizes<H>)
+    requires(MeasurementModel<H> || detail::explain_sensor<H>)
   auto update(cairn::BeliefOf<Filter, typename H::State>& belief, const H& sensor, const V& z) const {
     if (!(degrees > 0.0)) return detail::refused_as<H>(Status::bad_option);
     const int m = dof_of(detail::Given<typename H::Measurement, V>(z).value());
@@ -229,7 +229,7 @@ struct StudentT {
 /// R after one more measurement: (1 - rate) R + rate (r r^T + H P H^T), r = z - h(x) with the updated belief.
 /// 0 < rate < 1; about 1 / rate measurements count.
 template <class H, class V = typename H::Measurement>
-  requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
+  requires(LinearisedMeasurement<H> || detail::explain_sensor<H>)
 [[nodiscard]] CovarianceOf<typename H::Measurement> adapted_noise(
     const CovarianceOf<typename H::Measurement>& r, const Gaussian<typename H::State>& updated,
     const H& sensor, const V& z, double rate) {

@@ -206,7 +206,7 @@ public:
   Recorder(const Filter& filter, const Gaussian<X>& prior) : filter_(filter), belief_(Belief::from(prior)) {}
 
   template <class F, class U = typename F::Control>
-    requires(ProcessModel<F> || detail::explain_sizes<F>)
+    requires(ProcessModel<F> || detail::explain_process<F>)
   Status predict(const F& process, double dt, const U& control = detail::no_control<U>()) {
     const Belief before = belief_;
     const Status status = filter_.predict(belief_, process, dt, control);
@@ -217,7 +217,7 @@ public:
   }
 
   template <class H, class V = typename H::Measurement>
-    requires(MeasurementModel<H> || detail::explain_sizes<H>)
+    requires(MeasurementModel<H> || detail::explain_sensor<H>)
   auto update(const H& sensor, const V& z) {
     return filter_.update(belief_, sensor, z);
   }

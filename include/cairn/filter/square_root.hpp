@@ -106,7 +106,8 @@ struct SquareRoot {
   using BeliefOf = SquareRootGaussian<X>;
 
   template <class F, class U = typename F::Control>
-    requires(LinearisedProcess<F> || detail::explain_sizes<F>)
+    requires(LinearisedProcess<F> || detail::explain_process<F> ||
+             detail::explain_jacobian<F, ProcessModel<F>>)
   Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, double dt,
                  const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
@@ -133,7 +134,8 @@ struct SquareRoot {
   }
 
   template <class H, class V = typename H::Measurement>
-    requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
+    requires(LinearisedMeasurement<H> || detail::explain_sensor<H> ||
+             detail::explain_jacobian<H, MeasurementModel<H>>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
       SquareRootGaussian<typename H::State>& belief, const H& sensor, const V& z) const {
     using X = typename H::State;
@@ -172,7 +174,7 @@ struct SquareRootUnscented {
   using BeliefOf = SquareRootGaussian<X>;
 
   template <class F, class U = typename F::Control>
-    requires(ProcessModel<F> || detail::explain_sizes<F>)
+    requires(ProcessModel<F> || detail::explain_process<F>)
   Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, double dt,
                  const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
@@ -202,7 +204,7 @@ struct SquareRootUnscented {
   }
 
   template <class H, class V = typename H::Measurement>
-    requires(MeasurementModel<H> || detail::explain_sizes<H>)
+    requires(MeasurementModel<H> || detail::explain_sensor<H>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
       SquareRootGaussian<typename H::State>& belief, const H& sensor, const V& z) const {
     using X = typename H::State;

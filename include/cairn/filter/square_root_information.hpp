@@ -102,7 +102,8 @@ struct SquareRootInformationFilter {
   /// Moves the belief by one step of dt, and the point of linearisation to the estimate before, where there
   /// is one. Refused: a singular F. O(n^3).
   template <class F, class U = typename F::Control>
-    requires(LinearisedProcess<F> || detail::explain_sizes<F>)
+    requires(LinearisedProcess<F> || detail::explain_process<F> ||
+             detail::explain_jacobian<F, ProcessModel<F>>)
   Status predict(SquareRootInformation<typename F::State>& belief, const F& process, double dt,
                  const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
@@ -129,7 +130,8 @@ struct SquareRootInformationFilter {
 
   /// Adds the information of the measurement z, linearised at the belief's point. O((n + m) n^2).
   template <class H, class V = typename H::Measurement>
-    requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
+    requires(LinearisedMeasurement<H> || detail::explain_sensor<H> ||
+             detail::explain_jacobian<H, MeasurementModel<H>>)
   UpdateResult update(SquareRootInformation<typename H::State>& belief, const H& sensor, const V& z) const {
     using X = typename H::State;
     using S = ScalarOf<X>;

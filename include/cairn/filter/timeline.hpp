@@ -41,8 +41,8 @@ namespace cairn { inline namespace CAIRN_ABI {
 
 /// A belief in time under one process and the sensors H. Allocates; not safe for concurrent use.
 template <class Filter, class F, class... H>
-  requires(ProcessModel<F> || detail::explain_sizes<F>) &&
-          ((MeasurementModel<H> || detail::explain_sizes<H>) && ...)
+  requires(ProcessModel<F> || detail::explain_process<F>) &&
+          ((MeasurementModel<H> || detail::explain_sensor<H>) && ...)
 class Timeline {
 public:
   using State = typename F::State;
@@ -73,7 +73,7 @@ public:
   /// horizon, and what the filter refuses at that moment. A gated measurement is remembered: what comes later
   /// for an earlier moment may let it in.
   template <class Sensor, class V = typename Sensor::Measurement>
-    requires(std::same_as<Sensor, H> || ...)
+    requires((std::same_as<Sensor, H> || ...) || detail::explain_listed<Sensor>)
   auto measure(const Sensor& sensor, const V& z, double time) {
     using Result =
         decltype(filter_.update(base_.after, sensor, std::declval<typename Sensor::Measurement>()));

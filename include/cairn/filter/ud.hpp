@@ -66,7 +66,8 @@ struct UDFilter {
   using BeliefOf = UDGaussian<X>;
 
   template <class F, class U = typename F::Control>
-    requires(LinearisedProcess<F> || detail::explain_sizes<F>)
+    requires(LinearisedProcess<F> || detail::explain_process<F> ||
+             detail::explain_jacobian<F, ProcessModel<F>>)
   Status predict(UDGaussian<typename F::State>& belief, const F& process, double dt,
                  const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
@@ -99,7 +100,8 @@ struct UDFilter {
   }
 
   template <class H, class V = typename H::Measurement>
-    requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
+    requires(LinearisedMeasurement<H> || detail::explain_sensor<H> ||
+             detail::explain_jacobian<H, MeasurementModel<H>>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
       UDGaussian<typename H::State>& belief, const H& sensor, const V& z) const {
     using X = typename H::State;

@@ -119,7 +119,7 @@ struct Unscented {
 
   /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite, a P that is no covariance.
   template <class F, class U = typename F::Control>
-    requires(ProcessModel<F> || detail::explain_sizes<F>)
+    requires(ProcessModel<F> || detail::explain_process<F>)
   Status predict(Gaussian<typename F::State>& belief, const F& process, double dt,
                  const U& control = detail::no_control<U>()) const {
     if (!(dt >= 0.0) || !(dt <= std::numeric_limits<double>::max())) return Status::bad_time_step;
@@ -137,7 +137,7 @@ struct Unscented {
 
   /// Takes in the measurement z, or refuses it and leaves the belief as it was.
   template <class H, class V = typename H::Measurement>
-    requires(MeasurementModel<H> || detail::explain_sizes<H>)
+    requires(MeasurementModel<H> || detail::explain_sensor<H>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
       Gaussian<typename H::State>& belief, const H& sensor, const V& z) const {
     using X = typename H::State;

@@ -59,6 +59,16 @@ struct PointHasBrackets {
       "it: Through(points, 3, [](const P& p, std::size_t axis) { return axis == 0 ? p.x : ...; })");
 };
 
+/// The same of numbers.
+template <class P>
+struct PointIsNoNumber {
+  static_assert(
+      !std::is_arithmetic_v<P>,
+      "cairn: a set of points is asked for, and [i] of this is a number. Of a matrix, rows_of(m) or "
+      "columns_of(m) says which are the points; of flat memory, Rows(numbers, 3); one point alone "
+      "is std::array{point}");
+};
+
 /// Ends in the sentence, which names the type of the query.
 template <class Q>
 struct QueryHasBrackets {
@@ -79,8 +89,13 @@ inline constexpr bool explain_points = [] {
   if constexpr (requires(const S& set, std::size_t i) {
                   { set.size() } -> std::convertible_to<std::size_t>;
                   set[i];
-                })
-    static_cast<void>(sizeof(PointHasBrackets<std::remove_cvref_t<decltype(std::declval<const S&>()[0])>>));
+                }) {
+    using P = std::remove_cvref_t<decltype(std::declval<const S&>()[0])>;
+    if constexpr (std::is_arithmetic_v<P>)
+      static_cast<void>(sizeof(PointIsNoNumber<P>));
+    else
+      static_cast<void>(sizeof(PointHasBrackets<P>));
+  }
   return false;
 }();
 
@@ -104,6 +119,10 @@ inline constexpr bool owns_memory<Matrix> = std::is_same_v<Matrix, typename Matr
 template <class Matrix>
 concept MatrixThatStays = MatrixInMemory<std::remove_cvref_t<Matrix>> &&
                           (std::is_lvalue_reference_v<Matrix> || !owns_memory<std::remove_cvref_t<Matrix>>);
+/// A temporary that owns its numbers, or an expression of Eigen's that has none.
+template <class Matrix>
+concept MatrixThatGoes =
+    !MatrixThatStays<Matrix> && requires { typename std::remove_cvref_t<Matrix>::PlainObject; };
 
 }  // namespace detail
 
@@ -112,7 +131,8 @@ concept MatrixThatStays = MatrixInMemory<std::remove_cvref_t<Matrix>> &&
 template <class Q>
 concept QueryPoint = Point<Q> || detail::explain_query<Q>;
 
-/// Flat memory seen as points: `dim` numbers each, one after the other. The rows or the columns of a matrix
+/// Flat memory seen as points: `dim` numbers each, one after the other. A temporary that owns its numbers is
+/// refused. The rows or the columns of a matrix
 /// lie so in one of its two layouts only: rows_of() and columns_of() see them in both.
 template <class Scalar>
 class Rows {
@@ -129,6 +149,11 @@ public:
        std::size_t) = delete;  ///< rows_of(matrix) or columns_of(matrix) says which are the points
   template <detail::MatrixInMemory Matrix>
   explicit Rows(const Matrix&) = delete;  ///< the same
+  template <class Owner>
+    requires(!std::is_lvalue_reference_v<Owner> && !detail::MatrixInMemory<Owner> &&
+             std::convertible_to<Owner, std::span<const Scalar>> &&
+             !std::ranges::enable_borrowed_range<std::remove_cv_t<Owner>>)
+  Rows(Owner&&, std::size_t) = delete;  ///< a temporary: gone before it is read, give it a name
 
   [[nodiscard]] std::size_t size() const noexcept { return numbers_.size() / dim_; }
   [[nodiscard]] std::size_t dimension() const noexcept { return dim_; }
@@ -194,6 +219,11 @@ template <detail::MatrixThatStays Matrix>
                  static_cast<std::size_t>(matrix.cols()), std::ptrdiff_t{matrix.rowStride()},
                  std::ptrdiff_t{matrix.colStride()});
 }
+
+template <detail::MatrixThatGoes Matrix>
+void rows_of(Matrix&&) = delete;  ///< a temporary or an expression: no numbers that stay; give it a name
+template <detail::MatrixThatGoes Matrix>
+void columns_of(Matrix&&) = delete;  ///< a temporary or an expression: no numbers that stay; give it a name
 
 /// The columns of a matrix as points: a 3 x N Eigen matrix is N points of three numbers. Otherwise as
 /// rows_of().

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <concepts>
+#include <cstddef>
 
 #include <cairn/version.hpp>
 
@@ -139,6 +140,96 @@ struct JacobianIsConst {
   static_assert(!sizeof(Model),
                 "cairn: a filter holds models as const: write \"const\" behind jacobian(...)");
 };
+
+// What a model lacks. Model is printed.
+template <class Model>
+struct ProcessHasState {
+  static_assert(!sizeof(Model),
+                "cairn: predict() takes a process, which says in public: using State = ...; using Control = "
+                "...; propagate(x, u, dt) and noise(x, u, dt). This one has no State");
+};
+template <class Model>
+struct SensorHasState {
+  static_assert(
+      !sizeof(Model),
+      "cairn: update() takes a sensor, which says in public: using State = ...; using Measurement = "
+      "...; predict(x) and noise(x). This one has no State, so it is none: belief, sensor, "
+      "measurement is the order");
+};
+template <class Model>
+struct SensorHasMeasurement {
+  static_assert(
+      !sizeof(Model),
+      "cairn: update() takes a sensor, which says in public: using State = ...; using Measurement = "
+      "...; predict(x) and noise(x). This one has no Measurement");
+};
+template <class State>
+struct StateIsManifold {
+  static_assert(!sizeof(State),
+                "cairn: a State and a Measurement are a cairn::Vector<n> (of one number too), a rotation or "
+                "pose of cairn/manifold, or a type that cairn::manifold_traits is specialised for");
+};
+template <class Model>
+struct ProcessHasPropagate {
+  static_assert(!sizeof(Model),
+                "cairn: a process needs `State propagate(const State&, const Control&, double dt) const`: "
+                "these arguments in this order, where there is no control too (using Control = "
+                "cairn::NoControl)");
+};
+template <class Model>
+struct ProcessHasNoise {
+  static_assert(
+      !sizeof(Model),
+      "cairn: a process needs `noise(const State&, const Control&, double dt) const`, the covariance "
+      "of what a step adds: these arguments in this order");
+};
+template <class Model>
+struct SensorHasPredict {
+  static_assert(
+      !sizeof(Model),
+      "cairn: a sensor needs `Measurement predict(const State&) const`, what it sees without noise");
+};
+template <class Model>
+struct SensorHasNoise {
+  static_assert(!sizeof(Model),
+                "cairn: a sensor needs `noise(const State&) const`, the covariance of what it errs by");
+};
+template <class State, class Found>
+struct PropagatedIsState {
+  static_assert(!sizeof(Found), "cairn: propagate() of a process returns its State, or what converts to it");
+};
+template <class Measurement, class Found>
+struct PredictedIsMeasurement {
+  static_assert(!sizeof(Found),
+                "cairn: predict() of a sensor returns its Measurement, or what converts to it");
+};
+
+// What is given to a filter beside a model.
+template <class Asked, class Given>
+struct GivenConverts {
+  static_assert(std::convertible_to<const Given&, Asked>,
+                "cairn: what was given does not convert to the model's Measurement or Control; an angle is a "
+                "cairn::SO2 of radians, SO2(0.3)");
+};
+template <class Sensor>
+struct SensorIsListed {
+  static_assert(!sizeof(Sensor),
+                "cairn: this Timeline knows no sensor of this type: name it behind the process, "
+                "Timeline<Filter, Process, Sensor, ...>");
+};
+template <std::size_t Modes, std::size_t Processes>
+struct OneProcessForEachMode {
+  static_assert(Modes == Processes,
+                "cairn: Interacting<R, Filter> takes a std::tuple of R processes, one for each mode; here R "
+                "is the first number of OneProcessForEachMode<...> and the second is how many there are");
+};
+
+/// False, after the sentence: of what is asked for and is not there.
+template <class Sensor>
+inline constexpr bool explain_listed = (static_cast<void>(sizeof(SensorIsListed<Sensor>)), false);
+template <std::size_t Modes, std::size_t Processes>
+inline constexpr bool explain_modes =
+    (static_cast<void>(sizeof(OneProcessForEachMode<Modes, Processes>)), false);
 
 template <class Model>
 struct ModelIsLinear {

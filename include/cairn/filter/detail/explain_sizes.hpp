@@ -5,12 +5,13 @@
 /// What the compiler says about a model whose matrices have a wrong size or number type, whose functions are
 /// not const, or which is no model for the filter that it is given to.
 ///
-/// A filter takes F where `LinearProcess<F> || detail::explain_sizes<F>`: the concept is the condition; only
-/// where it is false is the model looked through here, and a matrix that cannot fit ends in a sentence with
-/// the sizes Expected<rows, columns, number> and Found<...> (-1 for one known at run time) instead of a list
-/// of failed overloads; so does a function that is not const. explain_linear and explain_jacobian stand
-/// behind it where a filter asks for more. Everything else that a model may lack is left to what the compiler
-/// says of concepts. The sentences themselves: agreement.hpp.
+/// A filter takes F where `LinearProcess<F> || detail::explain_process<F>`, H where `MeasurementModel<H> ||
+/// detail::explain_sensor<H>`: the concept is the condition; only where it is false is the model looked
+/// through here, and a matrix that cannot fit ends in a sentence with the sizes Expected<rows, columns,
+/// number> and Found<...> (-1 for one known at run time) instead of a list of failed overloads; so does a
+/// function that is not const, or is not there. explain_linear and explain_jacobian stand behind it where a
+/// filter asks for more; explain_sizes says nothing of what is not there. The sentences themselves:
+/// agreement.hpp.
 #pragma once
 
 #include <concepts>
@@ -47,6 +48,10 @@ struct FoundOr<Expected<R, C, S>, A> {
 template <template <class, class> class Claim, class Size, class A>
 using Claimed = Claim<Size, typename FoundOr<Size, A>::type>;
 
+/// Stands for a type that may be void, so that sizeof can be asked.
+template <class A>
+struct Returned {};
+
 template <class X>
 using SquareOf = Expected<dof<X>, dof<X>, ScalarOf<X>>;
 template <class X>
@@ -63,22 +68,36 @@ struct NoiseSizeOf<Model, X> {
   using type = SquareOf<typename Model::Noise>;
 };
 
-/// What F says as a process. Arguments are made up from nothing: all of this is looked at only.
-template <class F, Manifold X, class U>
-consteval void explain_process() {
+/// Whether propagate(x, u, dt), predict(x) and noise() are all that a model of this kind has to have: one
+/// whose noise is driven, that goes in continuous time or sees a part of the state has others.
+template <class Model>
+inline constexpr bool says_all_itself = !requires { typename Model::Noise; } &&
+                                        !requires { typename Model::Part; } && !requires { &Model::rate; };
+
+/// What F says as a process; whether it lacks anything, only where it is Asked for one. Arguments are made up
+/// from nothing: all of this is looked at only.
+template <class F, Manifold X, class U, bool Asked_for = false>
+consteval void look_at_process() {
   using Asked = const F&;
   if constexpr (requires(Asked f, const X& x, const U& u, double dt) { f.propagate(x, u, dt); }) {
     using A =
         decltype(std::declval<Asked>().propagate(std::declval<const X&>(), std::declval<const U&>(), 0.0));
-    if constexpr (is_vector<X>) static_cast<void>(sizeof(Claimed<PropagatedStateHas, StepOf<X>, A>));
+    if constexpr (is_vector<X> && OfEigen<std::remove_cvref_t<A>>)
+      static_cast<void>(sizeof(Claimed<PropagatedStateHas, StepOf<X>, A>));
+    else if constexpr (Asked_for && !std::convertible_to<A, X>)
+      static_cast<void>(sizeof(PropagatedIsState<X, Returned<A>>));
   } else if constexpr (requires(F& f, const X& x, const U& u, double dt) { f.propagate(x, u, dt); }) {
     static_cast<void>(sizeof(PropagateIsConst<F>));
+  } else if constexpr (Asked_for && says_all_itself<F>) {
+    static_cast<void>(sizeof(ProcessHasPropagate<F>));
   }
   if constexpr (requires(Asked f, const X& x, const U& u, double dt) { f.noise(x, u, dt); }) {
     using A = decltype(std::declval<Asked>().noise(std::declval<const X&>(), std::declval<const U&>(), 0.0));
     static_cast<void>(sizeof(Claimed<NoiseOfProcessHas, typename NoiseSizeOf<F, X>::type, A>));
   } else if constexpr (requires(F& f, const X& x, const U& u, double dt) { f.noise(x, u, dt); }) {
     static_cast<void>(sizeof(NoiseIsConst<F>));
+  } else if constexpr (Asked_for && says_all_itself<F>) {
+    static_cast<void>(sizeof(ProcessHasNoise<F>));
   }
   if constexpr (requires(Asked f, const X& x, const U& u, double dt) { f.jacobian(x, u, dt); }) {
     using A =
@@ -103,21 +122,28 @@ consteval void explain_process() {
   }
 }
 
-/// What H says as a sensor.
-template <class H, Manifold X, Manifold Z>
-consteval void explain_sensor() {
+/// What H says as a sensor, likewise.
+template <class H, Manifold X, Manifold Z, bool Asked_for = false>
+consteval void look_at_sensor() {
   using Asked = const H&;
   if constexpr (requires(Asked h, const X& x) { h.predict(x); }) {
     using A = decltype(std::declval<Asked>().predict(std::declval<const X&>()));
-    if constexpr (is_vector<Z>) static_cast<void>(sizeof(Claimed<PredictedMeasurementHas, StepOf<Z>, A>));
+    if constexpr (is_vector<Z> && OfEigen<std::remove_cvref_t<A>>)
+      static_cast<void>(sizeof(Claimed<PredictedMeasurementHas, StepOf<Z>, A>));
+    else if constexpr (Asked_for && !std::convertible_to<A, Z>)
+      static_cast<void>(sizeof(PredictedIsMeasurement<Z, Returned<A>>));
   } else if constexpr (requires(H& h, const X& x) { h.predict(x); }) {
     static_cast<void>(sizeof(PredictIsConst<H>));
+  } else if constexpr (Asked_for && says_all_itself<H>) {
+    static_cast<void>(sizeof(SensorHasPredict<H>));
   }
   if constexpr (requires(Asked h, const X& x) { h.noise(x); }) {
     using A = decltype(std::declval<Asked>().noise(std::declval<const X&>()));
     static_cast<void>(sizeof(Claimed<NoiseOfSensorHas, typename NoiseSizeOf<H, Z>::type, A>));
   } else if constexpr (requires(H& h, const X& x) { h.noise(x); }) {
     static_cast<void>(sizeof(NoiseIsConst<H>));
+  } else if constexpr (Asked_for && says_all_itself<H>) {
+    static_cast<void>(sizeof(SensorHasNoise<H>));
   }
   if constexpr (requires(Asked h, const X& x) { h.jacobian(x); }) {
     using A = decltype(std::declval<Asked>().jacobian(std::declval<const X&>()));
@@ -127,7 +153,7 @@ consteval void explain_sensor() {
   }
 }
 template <class H, Manifold X, Manifold Part, Manifold Z>
-consteval void explain_conditional_sensor() {
+consteval void look_at_conditional_sensor() {
   using Asked = const H&;
   if constexpr (requires(Asked h, const X& x, const Part& part) { h.noise(x, part); }) {
     using A = decltype(std::declval<Asked>().noise(std::declval<const X&>(), std::declval<const Part&>()));
@@ -141,8 +167,8 @@ consteval void explain_conditional_sensor() {
 }
 
 /// What is said of a state that is none because of its steps.
-template <class X>
-consteval void explain_state() {
+template <class X, bool Asked_for = false>
+consteval void look_at_state() {
   if constexpr (requires {
                   typename manifold_traits<X>::Scalar;
                   typename manifold_traits<X>::Tangent;
@@ -150,26 +176,49 @@ consteval void explain_state() {
                 })
     static_cast<void>(sizeof(TangentIs<Vector<manifold_traits<X>::dof, typename manifold_traits<X>::Scalar>,
                                        typename manifold_traits<X>::Tangent>));
+  else if constexpr (Asked_for)
+    static_cast<void>(sizeof(StateIsManifold<X>));
 }
 
-/// False, for a concept that is; or the sentence about the size that is wrong.
-template <class Model>
-inline constexpr bool explain_sizes = [] {
-  if constexpr (requires { typename Model::State; }) explain_state<typename Model::State>();
-  if constexpr (requires { typename Model::Measurement; }) explain_state<typename Model::Measurement>();
+/// Which part of a model is asked for.
+enum class Role { any, process, sensor };
+
+/// False, for a concept that is; or the sentence about the size that is wrong, or, of a model that is asked
+/// for in a role, about what it lacks.
+template <class Model, Role role>
+inline constexpr bool explain_as = [] {
+  constexpr bool process = role == Role::process, sensor = role == Role::sensor;
+  if constexpr (process && !requires { typename Model::State; })
+    static_cast<void>(sizeof(ProcessHasState<Model>));
+  else if constexpr (sensor && !requires { typename Model::State; })
+    static_cast<void>(sizeof(SensorHasState<Model>));
+  else if constexpr (sensor && !requires { typename Model::Measurement; })
+    static_cast<void>(sizeof(SensorHasMeasurement<Model>));
+  if constexpr (requires { typename Model::State; })
+    look_at_state<typename Model::State, process || sensor>();
+  if constexpr (requires { typename Model::Measurement; })
+    look_at_state<typename Model::Measurement, sensor>();
   if constexpr (requires { requires Manifold<typename Model::State>; }) {
     using X = typename Model::State;
-    if constexpr (requires { typename Model::Control; }) explain_process<Model, X, typename Model::Control>();
+    if constexpr (requires { typename Model::Control; })
+      look_at_process<Model, X, typename Model::Control, process>();
     if constexpr (requires { requires Manifold<typename Model::Measurement>; }) {
       using Z = typename Model::Measurement;
       static_cast<void>(sizeof(NumberOfMeasurementIs<ScalarOf<X>, ScalarOf<Z>>));
-      explain_sensor<Model, X, Z>();
+      look_at_sensor<Model, X, Z, sensor>();
       if constexpr (requires { requires Manifold<typename Model::Part>; })
-        explain_conditional_sensor<Model, X, typename Model::Part, Z>();
+        look_at_conditional_sensor<Model, X, typename Model::Part, Z>();
     }
   }
   return false;
 }();
+
+template <class Model>
+inline constexpr bool explain_sizes = explain_as<Model, Role::any>;
+template <class F>
+inline constexpr bool explain_process = explain_as<F, Role::process>;
+template <class H>
+inline constexpr bool explain_sensor = explain_as<H, Role::sensor>;
 
 /// False; or, of a model that is one in all else (IsModel), the sentence that it has no jacobian() or is not
 /// linear.
@@ -192,8 +241,7 @@ consteval bool given_fits() {
     static_cast<void>(sizeof(GivenVectorHas<Size, FoundIn<A>>));
     return true;
   } else {
-    static_assert(std::convertible_to<const A&, T>,
-                  "cairn: what was given does not convert to the model's Measurement or Control");
+    static_cast<void>(sizeof(GivenConverts<T, A>));
     return true;
   }
 }

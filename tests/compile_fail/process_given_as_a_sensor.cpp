@@ -1,0 +1,10 @@
+// words: no; Measurement; Process
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <cairn/filter/kalman.hpp>
+
+#include "models.hpp"
+
+auto step(Belief& belief, const Process& process, const cairn::Vector<2>& z) {
+  return cairn::Kalman{}.update(belief, process, z);
+}
