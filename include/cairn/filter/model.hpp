@@ -26,8 +26,10 @@
 /// automatic(model) of differentiate.hpp are asked for by name.
 ///
 /// Matrices and vectors may be returned as anything that stands for one (matrix_of.hpp): Structured, with
-/// zeros that the filters skip, row-major, a Map, an expression. Another number of rows or columns, or
-/// another number type, does not compile; sizes known at run time are compared (Status::size_mismatch).
+/// zeros that the filters skip, row-major, a Map, an expression. An expression of Eigen's refers to the
+/// matrices it is made of: of members and arguments it may be returned as auto, of a temporary (H * x +
+/// Vector<2>(1, 1)) it reads what is gone: write the type. Another number of rows or columns, or another
+/// number type, does not compile; sizes known at run time are compared (Status::size_mismatch).
 ///
 /// Models whose noise is not simply added say themselves how it enters, for the filters that follow it
 /// through the model (augmented_unscented.hpp, ensemble.hpp), which take the others as well:
