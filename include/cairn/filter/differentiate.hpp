@@ -158,14 +158,14 @@ template <class A, class B>
 
 /// The process's own Jacobian against central differences at (x, u, dt).
 template <class F>
-  requires(LinearisedProcess<F> || detail::explain_process<F>)
+  requires(LinearisedProcess<F> || detail::explain_sizes<F>)
 [[nodiscard]] JacobianComparison check_jacobian(const F& f, const typename F::State& x,
                                                 const typename F::Control& u, double dt) {
   return compare_jacobians(f.jacobian(x, u, dt), numeric(f).jacobian(x, u, dt));
 }
 /// The sensor's own Jacobian against central differences at x.
 template <class H>
-  requires(LinearisedMeasurement<H> || detail::explain_sensor<H>)
+  requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
 [[nodiscard]] JacobianComparison check_jacobian(const H& h, const typename H::State& x) {
   return compare_jacobians(h.jacobian(x), numeric(h).jacobian(x));
 }
@@ -194,7 +194,7 @@ template <class A, class B, class C>
 
 /// All three Jacobians of a process whose propagate is a template over the scalar, at (x, u, dt).
 template <class F>
-  requires(LinearisedProcess<F> || detail::explain_process<F>)
+  requires(LinearisedProcess<F> || detail::explain_sizes<F>)
 [[nodiscard]] JacobianCheck check_jacobians(const F& f, const typename F::State& x,
                                             const typename F::Control& u, double dt) {
   return detail::check_three(f.jacobian(x, u, dt), automatic(f).jacobian(x, u, dt),
@@ -202,7 +202,7 @@ template <class F>
 }
 /// All three Jacobians of a sensor whose predict is a template over the scalar, at x.
 template <class H>
-  requires(LinearisedMeasurement<H> || detail::explain_sensor<H>)
+  requires(LinearisedMeasurement<H> || detail::explain_sizes<H>)
 [[nodiscard]] JacobianCheck check_jacobians(const H& h, const typename H::State& x) {
   return detail::check_three(h.jacobian(x), automatic(h).jacobian(x), numeric(h).jacobian(x));
 }
