@@ -251,9 +251,9 @@ void add_errors(example::Report& page, const Results& r) {
                             readable(e->mean_angle * degrees)});
   };
   add("odometry", r.of_odometry);
-  add("drawn, with which the map was made", r.of_drawn);
-  add("means of the proposals", r.of_means);
-  add("matched once more to the final map", r.of_rematched);
+  add("the path with which the map was made, each pose drawn at random", r.of_drawn);
+  add("the same, each pose the mean of what it was drawn from", r.of_means);
+  add("the same, each scan matched once more to the finished map", r.of_rematched);
   page.add(table);
 }
 
@@ -340,8 +340,9 @@ std::optional<std::string> report(const Results& r) {
   page.figure({"Scans", std::to_string(r.scans), "", std::to_string(r.steps.size()) + " processed"});
   page.figure({"Loops", std::to_string(r.loops.size()), "", "relative poses measured at revisits"});
   if (r.of_means && r.of_means->count > 0)
-    page.figure({"Relations, mean", readable(r.of_means->mean), "m",
-                 readable(r.of_means->mean_angle * degrees) + " deg; means of the proposals"});
+    page.figure(
+        {"Error of relative poses", readable(r.of_means->mean), "m",
+         readable(r.of_means->mean_angle * degrees) + " deg; mean over the pairs whose truth is known"});
   page.figure({"Maps of all particles", readable(static_cast<double>(r.bytes) / 1048576.0), "MB"});
 #ifdef EXAMPLES_HAVE_PNG
   if (r.snapshots.empty())
