@@ -328,9 +328,12 @@ def mended(site):
 
 
 def readme_faults():
-    """Links of the documents as GitHub shows them."""
+    """Links of the documents as GitHub shows them, and code that doxygen would show as markup."""
     for path in [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]:
         text = re.sub(r"^```.*?^```", "", path.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
+        for span in re.findall(r"`([^`]+)`", text):
+            if "'" in span:
+                yield f"{path.relative_to(ROOT)}: doxygen takes the apostrophe in `{span}` for the end of the code: write it without one, or without backticks"
         for target in re.findall(r"\]\(([^)\s]+)\)", text):
             if re.match(r"[a-z]+:", target):
                 continue
