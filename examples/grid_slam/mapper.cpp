@@ -420,9 +420,9 @@ std::optional<Mapper::MeasuredLoop> Mapper::measured_loop(const std::vector<SE2>
   const SE2 shift = now.inverse() * found->pose;
   if (shift.translation().norm() > options.moved || std::abs(shift.angle()) > options.turned) {
     // In a corridor whose doors all look alike the best place is one of many.
-    const auto places =
-        search.find_places(coarse, now, around, 2, {options.look_alike, 1}, options.enough_score);
-    if (places.size() == 2 && places[1].score > options.still_alike * places[0].score) return std::nullopt;
+    const auto alike = search.find_places(coarse, now, around, 2, {options.look_alike, 1},
+                                          options.still_alike * found->score);
+    if (alike.size() == 2) return std::nullopt;
   }
   std::size_t first = begin;
   const auto distance = [&](std::size_t i) {
