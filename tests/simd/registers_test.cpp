@@ -75,6 +75,19 @@ TEST_SUITE("registers") {
     Lanes<std::int64_t, 2> whole;
     cairn::detail::shuffle<3, 1>(c, d, whole);
     CHECK((whole[0] == 3 && whole[1] == 1));
+    const auto pair = cairn::detail::shuffled<5, 0>(a, b);
+    static_assert(std::is_same_v<decltype(pair), const Lanes<float, 2>>);
+    CHECK((pair[0] == 5 && pair[1] == 0));
+  }
+
+  TEST_CASE("load, store, sum: any address, and neighbours are added first") {
+    const float from[6] = {0, 1e8F, 1, -1e8F, 3, 0};
+    float to[6] = {7, 7, 7, 7, 7, 7};
+    const auto lanes = cairn::detail::load<Lanes<float, 4>>(from + 1);
+    cairn::detail::store(lanes, to + 1);
+    CHECK((to[0] == 7 && to[1] == 1e8F && to[2] == 1 && to[3] == -1e8F && to[4] == 3 && to[5] == 7));
+    CHECK(cairn::detail::sum(lanes) == 0);  // 1e8 swallows 1, -1e8 swallows 3
+    CHECK(cairn::detail::sum(Lanes<std::int64_t, 2>{5, -7}) == -2);
   }
 }
 

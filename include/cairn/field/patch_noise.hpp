@@ -16,7 +16,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstring>
 #include <span>
 #include <vector>
 
@@ -51,13 +50,8 @@ void add_squares(const Matrix<dynamic, K>& a, Matrix<K>& to) {
         Eigen::Index r = first;
         for (; r + width <= end; r += width)
           each<3>([&](int u) __attribute__((always_inline)) {
-            Lane y;
-            std::memcpy(&y, right[u] + r, sizeof(Lane));
-            each<3>([&](int t) __attribute__((always_inline)) {
-              Lane x;
-              std::memcpy(&x, left[t] + r, sizeof(Lane));
-              sums[u][t] += x * y;
-            });
+            const Lane y = load<Lane>(right[u] + r);
+            each<3>([&](int t) { sums[u][t] += load<Lane>(left[t] + r) * y; });
           });
         for (int u = 0; u < 3 && j + u < K; ++u)
           for (int t = 0; t < 3 && i + t < K; ++t) {

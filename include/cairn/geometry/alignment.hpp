@@ -97,10 +97,6 @@ struct AlignmentMoments {
 
 using DoublePair = Lanes<double, 2>;
 
-[[nodiscard]] inline double sum(const DoublePair& pair) noexcept {
-  return pair[0] + pair[1];
-}
-
 /// The sums behind AlignmentMoments, of two pairs of points at a time: accumulators in vectors stay in
 /// registers, those in matrices would wait for memory.
 class MomentSums {

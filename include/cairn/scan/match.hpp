@@ -21,7 +21,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <span>
 
 #include <cairn/core/check.hpp>
@@ -117,9 +116,7 @@ public:
   /// Fours of points.
   [[nodiscard]] std::size_t fours() const noexcept { return (count + 3) / 4; }
   [[nodiscard]] static FourFloats four(const Numbers& numbers, std::size_t k) noexcept {
-    FourFloats out;
-    std::memcpy(&out, numbers.data() + 4 * k, sizeof out);
-    return out;
+    return load<FourFloats>(numbers.data() + 4 * k);
   }
 
 private:

@@ -10,7 +10,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstring>
 
 #include <cairn/simd/registers.hpp>
 #include <cairn/version.hpp>
@@ -27,14 +26,14 @@ template <int Width, int Columns, class S>
   Lane sum[Columns][Width]{};
   for (std::ptrdiff_t k = 0; k < inner; ++k) {
     Lane of_a[Width];
-    each<Width>([&](int r) { std::memcpy(&of_a[r], a + k * rows + r * lanes, sizeof(Lane)); });
+    each<Width>([&](int r) { of_a[r] = load<Lane>(a + k * rows + r * lanes); });
     each<Columns>([&](int c) __attribute__((always_inline)) {
       const S factor = b[c * inner + k];
       each<Width>([&](int r) { sum[c][r] += of_a[r] * factor; });
     });
   }
   each<Columns>([&](int c) __attribute__((always_inline)) {
-    each<Width>([&](int r) { std::memcpy(to + c * rows + r * lanes, &sum[c][r], sizeof(Lane)); });
+    each<Width>([&](int r) { store(sum[c][r], to + c * rows + r * lanes); });
   });
 }
 

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstring>
 #include <type_traits>
 #include <utility>
 
@@ -85,14 +86,39 @@ template <int... From, class Vector, class Result>
 #endif
 }
 
-/// Lane l of the result is number Pick{}(l) of a and b written one after the other.
-template <class S, int W, class Pick, class Lane>
-[[gnu::always_inline]] inline Lanes<S, W> shuffled(const Lane& a, const Lane& b) {
-  Lanes<S, W> result;
-  [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
-    shuffle<Pick{}(static_cast<int>(I))...>(a, b, result);
-  }(std::make_index_sequence<W>{});
+/// The same by value. The order is Pick{}(0), Pick{}(1) ... where that says more than the numbers.
+template <int... From, class Lane>
+[[nodiscard, gnu::always_inline]] inline auto shuffled(const Lane& a, const Lane& b) noexcept {
+  Lanes<std::remove_cvref_t<decltype(a[0])>, sizeof...(From)> result;
+  shuffle<From...>(a, b, result);
   return result;
+}
+template <class S, int W, class Pick, class Lane>
+[[nodiscard, gnu::always_inline]] inline Lanes<S, W> shuffled(const Lane& a, const Lane& b) noexcept {
+  return [&]<std::size_t... I>(std::index_sequence<I...>) __attribute__((always_inline)) {
+    return shuffled<Pick{}(static_cast<int>(I))...>(a, b);
+  }(std::make_index_sequence<W>{});
+}
+
+/// As many numbers as there are lanes, from or to any address.
+template <class Lane, class T>
+[[nodiscard, gnu::always_inline]] inline Lane load(const T* from) noexcept {
+  Lane lane;
+  std::memcpy(&lane, from, sizeof(Lane));
+  return lane;
+}
+template <class Lane, class T>
+[[gnu::always_inline]] inline void store(const Lane& lane, T* to) noexcept {
+  std::memcpy(to, &lane, sizeof(Lane));
+}
+
+/// The sum of two lanes or four, in an order that is the same everywhere.
+template <class Lane>
+[[nodiscard]] inline auto sum(const Lane& lane) noexcept {
+  if constexpr (sizeof(Lane) == 2 * sizeof(lane[0]))
+    return lane[0] + lane[1];
+  else
+    return (lane[0] + lane[1]) + (lane[2] + lane[3]);
 }
 
 }}}  // namespace cairn::CAIRN_ABI::detail

@@ -11,7 +11,6 @@
 #pragma once
 
 #include <cstddef>
-#include <cstring>
 #include <utility>
 
 #include <cairn/filter/structured.hpp>
@@ -45,9 +44,7 @@ template <class S, int W, int R>
   using Lane = Lanes<S, W>;
   constexpr int half = W / 2;
   if constexpr (R >= W) {
-    Lane lane;
-    std::memcpy(&lane, from, sizeof(Lane));
-    return lane;
+    return load<Lane>(from);
   } else if constexpr (R <= 0) {
     return Lane{};
   } else if constexpr (W == 2) {
@@ -63,7 +60,7 @@ template <class S, int W, int R, class Lane>
 [[gnu::always_inline]] inline void store_lanes(S* to, const Lane& lane) {
   constexpr int half = W / 2;
   if constexpr (R >= W) {
-    std::memcpy(to, &lane, sizeof(Lane));
+    store(lane, to);
   } else if constexpr (W == 2) {
     if constexpr (R == 1) to[0] = lane[0];
   } else if constexpr (R > 0) {

@@ -294,25 +294,10 @@ public:
     constexpr std::size_t width = sizeof(Lane);
     Lane differ{};
     std::size_t at = 0;
-    for (; at + width <= size; at += width) {
-      Lane of_a, of_b;
-      std::memcpy(&of_a, a + at, width);
-      std::memcpy(&of_b, b + at, width);
-      differ |= of_a ^ of_b;
-    }
+    for (; at + width <= size; at += width) differ |= load<Lane>(a + at) ^ load<Lane>(b + at);
     Word rest = 0;
-    for (; at + sizeof(Word) <= size; at += sizeof(Word)) {
-      Word of_a, of_b;
-      std::memcpy(&of_a, a + at, sizeof(Word));
-      std::memcpy(&of_b, b + at, sizeof(Word));
-      rest |= of_a ^ of_b;
-    }
-    if constexpr (size % sizeof(Word) != 0) {
-      std::uint32_t of_a, of_b;
-      std::memcpy(&of_a, a + at, sizeof(of_a));
-      std::memcpy(&of_b, b + at, sizeof(of_b));
-      rest |= of_a ^ of_b;
-    }
+    for (; at + sizeof(Word) <= size; at += sizeof(Word)) rest |= load<Word>(a + at) ^ load<Word>(b + at);
+    if constexpr (size % sizeof(Word) != 0) rest |= load<std::uint32_t>(a + at) ^ load<std::uint32_t>(b + at);
     if constexpr (size >= width)
       for (std::size_t k = 0; k < width / sizeof(Word); ++k) rest |= differ[k];
     return rest == 0;

@@ -147,7 +147,7 @@ private:
       cost += inside ? s.chi_squared : gate_ + MatchLane{};
       if (i % 4 == 3 && sum(cost) > limit) break;
     }
-    return {sum(cost), static_cast<std::size_t>((inliers[0] + inliers[1]) + (inliers[2] + inliers[3]))};
+    return {sum(cost), static_cast<std::size_t>(sum(inliers))};
   }
 
   [[gnu::always_inline]] void linearise_lanes(std::span<const MatchLanes> matches, const StereoView& view,

@@ -41,11 +41,6 @@ typedef Lanes<double, 4> MatchLane __attribute__((aligned(32)));  // gcc without
 inline constexpr std::size_t match_lanes = 4;
 static_assert(sizeof(MatchLane) == 32 && alignof(MatchLane) == 32);
 
-/// The sum of the lanes, in an order that is the same everywhere.
-[[nodiscard]] inline double sum(const MatchLane& lane) noexcept {
-  return (lane[0] + lane[1]) + (lane[2] + lane[3]);
-}
-
 /// One camera's observations: normalised coordinates, and what whitens their residuals.
 struct alignas(MatchLane) WhitenedPixels {
   MatchLane x, y;

@@ -53,12 +53,9 @@ template <class Record>
   auto high = begin->point;
   if constexpr (sizeof(Record) == 16 && std::is_same_v<std::remove_cvref_t<decltype(low[0])>, float>) {
     using Four = Lanes<float, 4>;  // the number rides along as a fourth coordinate
-    Four lows;
-    std::memcpy(&lows, begin, sizeof(lows));
-    Four highs = lows;
+    Four lows = load<Four>(begin), highs = lows;
     for (const Record* at = begin; at != end; ++at) {
-      Four numbers;
-      std::memcpy(&numbers, at, sizeof(numbers));
+      const Four numbers = load<Four>(at);
       lows = numbers < lows ? numbers : lows;
       highs = numbers > highs ? numbers : highs;
     }

@@ -114,7 +114,7 @@ struct HessianTaps {
 /// First box - Weight * second box at the samples k, ..., k + 3.
 template <int Weight>
 [[nodiscard, gnu::always_inline]] inline Unsigned4 box_difference(const BoxPair& taps, int k) noexcept {
-  const auto corner = [&](std::size_t i) { return load4<Unsigned4>(taps[i] + k); };
+  const auto corner = [&](std::size_t i) { return load<Unsigned4>(taps[i] + k); };
   const Unsigned4 first = (corner(3) - corner(2)) - (corner(1) - corner(0));
   const Unsigned4 second = (corner(7) - corner(6)) - (corner(5) - corner(4));
   return Weight == 3 ? first - (second + second + second) : first - second;
@@ -124,15 +124,15 @@ template <int Weight>
 inline void hessian_row_narrow(const HessianTaps& taps, float weight, int count, float* out,
                                std::uint32_t* scratch) noexcept {
   const int room = (count + 3) / 4 * 4;
-  for (int k = 0; k < count; k += 4) store4(box_difference<3>(taps.xx, k), scratch + k);
-  for (int k = 0; k < count; k += 4) store4(box_difference<3>(taps.yy, k), scratch + room + k);
-  for (int k = 0; k < count; k += 4) store4(box_difference<1>(taps.above, k), scratch + 2 * room + k);
+  for (int k = 0; k < count; k += 4) store(box_difference<3>(taps.xx, k), scratch + k);
+  for (int k = 0; k < count; k += 4) store(box_difference<3>(taps.yy, k), scratch + room + k);
+  for (int k = 0; k < count; k += 4) store(box_difference<1>(taps.above, k), scratch + 2 * room + k);
   for (int k = 0; k < count; k += 4) {
     const Unsigned4 below = box_difference<1>(taps.below, k);
-    const Float4 dxx = to_float(load4<Unsigned4>(scratch + k)) * weight;
-    const Float4 dyy = to_float(load4<Unsigned4>(scratch + room + k)) * weight;
-    const Float4 dxy = to_float(load4<Unsigned4>(scratch + 2 * room + k) - below) * (0.9F * weight);
-    store4(dxx * dyy - dxy * dxy, out + k);
+    const Float4 dxx = to_float(load<Unsigned4>(scratch + k)) * weight;
+    const Float4 dyy = to_float(load<Unsigned4>(scratch + room + k)) * weight;
+    const Float4 dxy = to_float(load<Unsigned4>(scratch + 2 * room + k) - below) * (0.9F * weight);
+    store(dxx * dyy - dxy * dxy, out + k);
   }
 }
 

@@ -103,11 +103,11 @@ void sample_cells(const IntegralImage& sums, double x, double y, double size, Ce
       const Float4 sum = to_float(above - upper[pair]) + (part - upper_part[pair]);
       upper[pair] = above;
       upper_part[pair] = part;
-      return sum * load4<Float4>(&across.parts[4 * pair]);
+      return sum * load<Float4>(&across.parts[4 * pair]);
     };
     for (std::size_t k = 0; k < count; k += 4) {
       const Float4 two = strip(k / 2), two_more = strip(k / 2 + 1);
-      store4(lanes_of<0, 2, 4, 6>(two, two_more) + lanes_of<1, 3, 5, 7>(two, two_more), &line[k]);
+      store(shuffled<0, 2, 4, 6>(two, two_more) + shuffled<1, 3, 5, 7>(two, two_more), &line[k]);
     }
     if (j == 0) continue;
     float* const cells = grid.row(static_cast<int>(j) - 1);
@@ -139,18 +139,18 @@ void turn_cells(const CellGrid<M>& upright, float cosine, float sine, CellGrid<N
       x -= __builtin_convertvector(column, Float4);
       y -= __builtin_convertvector(line, Float4);
       std::array<std::int32_t, 4> at;
-      store4(line * stride + column, at.data());
+      store(line * stride + column, at.data());
       for (std::size_t lane = static_cast<std::size_t>(N - i); lane < 4; ++lane) at[lane] = 0;
       const float* const cells = upright.cells.data();
       const Float4 above = load_pairs(cells + at[0], cells + at[1]);
       const Float4 above_more = load_pairs(cells + at[2], cells + at[3]);
       const Float4 below = load_pairs(cells + stride + at[0], cells + stride + at[1]);
       const Float4 below_more = load_pairs(cells + stride + at[2], cells + stride + at[3]);
-      const Float4 mixed = above + (below - above) * lanes_of<0, 0, 1, 1>(y, y);
-      const Float4 more = above_more + (below_more - above_more) * lanes_of<2, 2, 3, 3>(y, y);
-      const Float4 left = lanes_of<0, 2, 4, 6>(mixed, more);
-      const Float4 right = lanes_of<1, 3, 5, 7>(mixed, more);
-      store4(left + (right - left) * x, row + i);
+      const Float4 mixed = above + (below - above) * shuffled<0, 0, 1, 1>(y, y);
+      const Float4 more = above_more + (below_more - above_more) * shuffled<2, 2, 3, 3>(y, y);
+      const Float4 left = shuffled<0, 2, 4, 6>(mixed, more);
+      const Float4 right = shuffled<1, 3, 5, 7>(mixed, more);
+      store(left + (right - left) * x, row + i);
     }
   }
 }

@@ -11,7 +11,6 @@
 #pragma once
 
 #include <cstdint>
-#include <cstring>
 
 #include <cairn/simd/registers.hpp>
 #include <cairn/version.hpp>
@@ -23,38 +22,12 @@ using Signed4 = Lanes<std::int32_t, 4>;
 using Float4 = Lanes<float, 4>;
 using Long2 = Lanes<std::uint64_t, 2>;
 
-/// Four numbers from anywhere; no alignment is asked for.
-template <class Vector, class Number>
-[[nodiscard, gnu::always_inline]] inline Vector load4(const Number* from) noexcept {
-  static_assert(sizeof(Number) == 4 && sizeof(Vector) == 16);
-  Vector vector;
-  std::memcpy(&vector, from, sizeof vector);
-  return vector;
-}
-
-template <class Vector, class Number>
-[[gnu::always_inline]] inline void store4(const Vector& vector, Number* to) noexcept {
-  static_assert(sizeof(Number) == 4 && sizeof(Vector) == 16);
-  std::memcpy(to, &vector, sizeof vector);
-}
-
 /// from[0], from[1], also_from[0], also_from[1].
 template <class Number>
 [[nodiscard, gnu::always_inline]] inline auto load_pairs(const Number* from,
                                                          const Number* also_from) noexcept {
   static_assert(sizeof(Number) == 4);
-  std::uint64_t first, second;
-  std::memcpy(&first, from, sizeof first);
-  std::memcpy(&second, also_from, sizeof second);
-  return reinterpret_cast<Lanes<Number, 4>>(Long2{first, second});
-}
-
-/// Lanes of a and b written one after the other, by their numbers.
-template <int First, int Second, int Third, int Fourth>
-[[nodiscard, gnu::always_inline]] inline Float4 lanes_of(const Float4& a, const Float4& b) noexcept {
-  Float4 lanes;
-  shuffle<First, Second, Third, Fourth>(a, b, lanes);
-  return lanes;
+  return reinterpret_cast<Lanes<Number, 4>>(Long2{load<std::uint64_t>(from), load<std::uint64_t>(also_from)});
 }
 
 [[nodiscard, gnu::always_inline]] inline Float4 to_float(Unsigned4 two_complement) noexcept {

@@ -53,10 +53,10 @@ inline int candidates(const float* above, const float* centre, const float* belo
                       int* out) noexcept {
   int found = 0;
   for (int k = 0; k < count; k += 4) {
-    const auto here = load4<Float4>(centre + k);
-    const Signed4 mask = (here >= threshold) & (here > load4<Float4>(centre + k - 1)) &
-                         (here >= load4<Float4>(centre + k + 1)) & (here > load4<Float4>(above + k)) &
-                         (here >= load4<Float4>(below + k));
+    const auto here = load<Float4>(centre + k);
+    const Signed4 mask = (here >= threshold) & (here > load<Float4>(centre + k - 1)) &
+                         (here >= load<Float4>(centre + k + 1)) & (here > load<Float4>(above + k)) &
+                         (here >= load<Float4>(below + k));
     const auto halves = reinterpret_cast<Long2>(mask);
     if ((halves[0] | halves[1]) == 0) [[likely]]
       continue;

@@ -74,9 +74,9 @@ using ResponseGrid = std::array<std::array<HaarResponses, responses_a_side / 4>,
 inline void haar_responses(const DescriptorCells& grid, ResponseGrid& responses) noexcept {
   for (int j = 0; j < responses_a_side; ++j)
     for (int i = 0; i < responses_a_side; i += 4) {
-      const auto above = load4<Float4>(grid.row(j) + i), above_right = load4<Float4>(grid.row(j) + i + 1);
-      const auto below = load4<Float4>(grid.row(j + 1) + i);
-      const auto below_right = load4<Float4>(grid.row(j + 1) + i + 1);
+      const auto above = load<Float4>(grid.row(j) + i), above_right = load<Float4>(grid.row(j) + i + 1);
+      const auto below = load<Float4>(grid.row(j + 1) + i);
+      const auto below_right = load<Float4>(grid.row(j + 1) + i + 1);
       responses[static_cast<std::size_t>(j)][static_cast<std::size_t>(i / 4)] = {
           (above_right + below_right) - (above + below), (below + below_right) - (above + above_right)};
     }
@@ -118,7 +118,7 @@ void sum_subregions(const ResponseGrid& responses, const SubregionWeights& weigh
         add_responses(responses[static_cast<std::size_t>(j)][i], down.weight[static_cast<std::size_t>(j)],
                       columns);
       for (std::size_t across = 0; across < 4; ++across) {
-        const auto weight = load4<Float4>(&weights.subregions[across].weight[4 * i]);
+        const auto weight = load<Float4>(&weights.subregions[across].weight[4 * i]);
         for (std::size_t n = 0; n < Sums; ++n) totals[across][n] += weight * columns[n];
       }
     }

@@ -38,12 +38,12 @@ struct Directions {
 
   void find_orders() noexcept {
     for (std::size_t i = 0; i < count; i += 4) {
-      const auto x4 = load4<Float4>(&x[i]);
-      const auto y4 = load4<Float4>(&y[i]);
+      const auto x4 = load<Float4>(&x[i]);
+      const auto y4 = load<Float4>(&y[i]);
       const Float4 from = direction_order(x4, y4);
       const Float4 to = direction_order(0.5F * x4 - 0.8660254F * y4, 0.8660254F * x4 + 0.5F * y4);
-      store4(from, &order[i]);
-      store4(to < from ? to + 4 : to, &limit[i]);
+      store(from, &order[i]);
+      store(to < from ? to + 4 : to, &limit[i]);
     }
   }
 
