@@ -17,7 +17,6 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/parallel.hpp>
 #include <cairn/index/best_bin_first.hpp>
-#include <cairn/index/descriptor_index.hpp>
 #include <cairn/index/kd_tree.hpp>
 #include <cairn/index/packed_points.hpp>
 #include <cairn/index/principal_axes.hpp>
@@ -76,34 +75,6 @@ std::unique_ptr<DescriptorRival> make_our_tree() {
                       [tree](const std::vector<float>& queries, int leaves) {
                         return (*tree)->search(queries, static_cast<std::size_t>(leaves));
                       }});
-}
-
-/// cairn's cells around means; refers to the rows.
-std::unique_ptr<DescriptorRival> make_our_cells(std::size_t dim, cairn::DescriptorCodes codes) {
-  using Index = cairn::DescriptorIndex<cairn::Rows<float>>;
-  struct Held {
-    std::optional<cairn::Rows<float>> rows;
-    std::optional<Index> index;
-  };
-  auto held = std::make_shared<Held>();
-  return std::make_unique<DescriptorRival>(DescriptorRival{
-      codes == cairn::DescriptorCodes::off ? "cells without codes" : "cells",
-      [held, dim, codes](const float* rows, std::size_t count) {
-        held->rows.emplace(std::span(rows, count * dim), dim);
-        held->index.emplace(*held->rows, cairn::DescriptorIndexOptions{.codes = codes});
-      },
-      [held, dim](const std::vector<float>& queries, int leaves) {
-        const cairn::Rows<float> asked(queries, dim);
-        std::vector<TwoNearest> found(asked.size());
-        Index::Search search;
-        for (std::size_t i = 0; i < found.size(); ++i) {
-          cairn::NearestTwo<float> two;
-          search.search(*held->index, asked[i], two, {.leaves = static_cast<std::size_t>(leaves)});
-          found[i] = {two.id(), two.first(), two.second()};
-        }
-        return found;
-      },
-      [held] { return held->index->bytes(); }});
 }
 
 /// Exact search as a product of matrices, 128 queries at a time. The best eight are ranked again by
@@ -256,8 +227,8 @@ struct Field {
     const bool bytes = are_bytes(base) && are_bytes(queries);
     std::vector<std::unique_ptr<DescriptorRival>> own, others;
     own.push_back(make_our_tree<Dim>());
-    own.push_back(make_our_cells(Dim, cairn::DescriptorCodes::automatic));
-    if (Dim >= 96) own.push_back(make_our_cells(Dim, cairn::DescriptorCodes::off));  // what codes are worth
+    own.push_back(make_our_cells(Dim, true));
+    if (Dim >= 96) own.push_back(make_our_cells(Dim, false));  // what codes are worth
     others.push_back(make_flann_trees(Dim, 4));
     others.push_back(make_faiss_ivf(Dim));
     others.push_back(make_glass(Dim));

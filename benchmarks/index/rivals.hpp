@@ -69,6 +69,8 @@ struct DescriptorRival {
   std::function<std::vector<TwoNearest>(const std::vector<float>& queries, int checks)> search;
   std::function<std::size_t()> bytes{};  ///< held beside the rows that were added; of our own ways
 };
+/// cairn's cells around means; refers to the rows. A budget is one of blocks.
+std::unique_ptr<DescriptorRival> make_our_cells(std::size_t dim, bool with_codes);
 std::unique_ptr<DescriptorRival> make_flann_trees(std::size_t dim, int trees);
 std::unique_ptr<DescriptorRival> make_hnswlib(std::size_t dim);
 /// Only for coordinates that are whole numbers from 0 to 255.

@@ -39,12 +39,14 @@ struct Options {
 };
 
 constexpr const char* usage =
-    "usage: index_study [--quick | --full] [--only points_3|clusters_64|sift_128|surf_64] [--out FOLDER]\n"
+    "usage: index_study [--quick | --full] [--only points_3|clusters_64|sift_128|surf_64|recall] [--out "
+    "FOLDER]\n"
     "  --quick   up to 3e5 points and 5e4 descriptors, about three minutes (the default)\n"
     "  --full    up to 1e7 points and 1e6 descriptors, half an hour\n"
     "  --version, --help\n";
 
-constexpr std::array<std::string_view, 4> stream_names{"points_3", "clusters_64", "sift_128", "surf_64"};
+constexpr std::array<std::string_view, 5> stream_names{"points_3", "clusters_64", "sift_128", "surf_64",
+                                                       "recall"};
 
 /// What the command line asks for, or the exit code of the answer to it.
 std::variant<Options, int> parse(int argc, char** argv) {
@@ -135,22 +137,24 @@ std::vector<Study> run_all(const Options& options) {
 }
 
 example::ResultFolder results_in(const std::filesystem::path& folder) {
-  return {folder, {"index_study.json", "index_study.csv", "index_study.html"}};
+  return {folder, {"index_study.json", "index_study.csv", "index_recall.csv", "index_study.html"}};
 }
 
 /// Writes everything; returns how many answers were wrong.
-std::size_t finish(const std::vector<Study>& studies, const Options& options) {
+std::size_t finish(const std::vector<Study>& studies, const std::vector<cairn_study::RecallStudy>& recalls,
+                   const Options& options) {
   const cairn_bench::Context here = cairn_bench::context();
   const std::string subtitle =
       here.cpu + ", one thread; " + here.compiler + "; " + here.flags + (options.full ? "; full" : "; quick");
-  const auto page = make_report(studies, subtitle).html();
+  const auto page = make_report(studies, recalls, subtitle).html();
   results_in(options.out).replace([&](const std::filesystem::path& staging) {
     cairn::write_file_atomically(staging / "index_study.json", to_json(studies));
     cairn::write_file_atomically(staging / "index_study.csv", to_csv(studies));
+    cairn::write_file_atomically(staging / "index_recall.csv", recall_csv(recalls));
     if (page) cairn::write_file_atomically(staging / "index_study.html", *page);
   });
   std::cout << "The results are in " << options.out.string() << ":\n";
-  for (const char* name : {"index_study.json", "index_study.csv", "index_study.html"})
+  for (const char* name : {"index_study.json", "index_study.csv", "index_recall.csv", "index_study.html"})
     if (page || std::string_view(name) != "index_study.html")
       std::cout << "  " << (options.out / name).string() << '\n';
   if (!page) std::cout << "  " << example::why_no_report() << '\n';
@@ -168,11 +172,14 @@ int main(int argc, char** argv) try {
   const Options& options = std::get<Options>(asked);
   results_in(options.out).prepare();
   const std::vector<Study> studies = run_all(options);
-  if (studies.empty()) {
+  const std::vector<cairn_study::RecallStudy> recalls = options.only.empty() || options.only == "recall"
+                                                            ? cairn_study::recall_studies()
+                                                            : std::vector<cairn_study::RecallStudy>{};
+  if (studies.empty() && recalls.empty()) {
     std::cerr << "index_study: nothing was run\n" << usage;
     return 2;
   }
-  if (const std::size_t wrong = finish(studies, options); wrong > 0) {
+  if (const std::size_t wrong = finish(studies, recalls, options); wrong > 0) {
     std::cerr << "index_study: " << wrong << " answers were wrong\n";
     return 1;
   }

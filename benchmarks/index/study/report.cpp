@@ -155,8 +155,11 @@ void add_figures(example::Report& report, const Study& study) {
 
 }  // namespace
 
-example::Report make_report(const std::vector<Study>& studies, const std::string& subtitle) {
-  example::Report report("Single tree against multi-kd-tree", subtitle);
+example::Report make_report(const std::vector<Study>& studies, const std::vector<RecallStudy>& recalls,
+                            const std::string& subtitle) {
+  example::Report report(
+      studies.empty() ? "Recall against time" : "Single tree against multi-kd-tree, and recall against time",
+      subtitle);
   std::size_t wrong = 0;
   std::size_t checked = 0;
   for (const Study& study : studies) {
@@ -166,6 +169,8 @@ example::Report make_report(const std::vector<Study>& studies, const std::string
       checked += result.drive.checked;
     }
   }
+  for (const RecallStudy& study : recalls) add_recall(report, study);
+  if (studies.empty()) return report;
   report.figure(
       {.label = "wrong answers",
        .value = std::to_string(wrong),
