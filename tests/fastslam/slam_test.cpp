@@ -7,12 +7,14 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <initializer_list>
 #include <string>
 #include <vector>
 
 #include <Eigen/Cholesky>
 #include <doctest/doctest.h>
 
+#include <cairn/core/random.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/filter/gaussian.hpp>
 
@@ -313,6 +315,41 @@ TEST_SUITE("fastslam/slam") {
     CHECK(log.notes[0].find("99") != std::string::npos);
     const Results r = run(log, {.particles = 3});
     CHECK(r.mean.size() == 4);
+  }
+
+  TEST_CASE("fastslam: a robot that moves later than its odometry says is found out by how bearings turn") {
+    // It stands and looks to and fro; what turns it is known in closed form.
+    const auto heading = [](double t) { return 0.6 * std::sin(1.3 * t) + 0.3 * std::sin(2.9 * t + 1); };
+    const auto rate = [](double t) {
+      return 0.6 * 1.3 * std::cos(1.3 * t) + 0.3 * 2.9 * std::cos(2.9 * t + 1);
+    };
+    const auto line = [](std::initializer_list<double> numbers) {
+      std::string text;
+      for (const double n : numbers) text += std::to_string(n) + " ";
+      return text + "\n";
+    };
+    cairn::Random random(1);
+    for (const double late : {0.23, -0.1, 0.0}) {
+      CAPTURE(late);
+      const cairn_test::Folder folder;
+      std::string odometry, sightings;
+      for (int i = 0; i <= 3000; ++i) odometry += line({0.02 * i, 0, rate(0.02 * i + 0.01)});
+      for (int i = 4; i < 236; ++i) {
+        const double t = 0.25 * i;
+        sightings += line({t, 63, 3, 0.2 - heading(t - late) + random.normal(0, 0.01)});
+      }
+      put_robot(folder, odometry, sightings);
+      const LandmarkLog log = read_mrclam(folder / "", 1);
+      double worst = 0;
+      for (std::size_t k = 1; k < log.frames.size(); ++k) {
+        const double turned = heading(log.frames[k].time - late) - heading(log.frames[k - 1].time - late);
+        worst = std::max(worst, std::abs(log.frames[k].moved.mean.rotation().angle() - turned));
+      }
+      CHECK(worst < 0.04);  // where it would be a quarter of a radian
+      CHECK(log.frames.size() == 232);
+      const std::string note = log.notes.empty() ? "" : log.notes[0];
+      CHECK((late == 0 || note.find("later than odometry") != std::string::npos));
+    }
   }
 
   TEST_CASE("fastslam: bad logs are refused in words that name file and line") {
