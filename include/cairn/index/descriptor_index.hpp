@@ -292,19 +292,27 @@ private:
     for (const PointId id : ids)
       if (cells_.contains(id))
         raise("DescriptorIndex::insert: point " + std::to_string(id) + " is in the index already");
-    std::size_t done = 0;
-    try {
-      for (; done < ids.size(); ++done) {
-        ++size_;
-        cells_.insert(ids[done], &codes[done * dim], 2 * in_cell());
+    // Nothing is in where one could not be put in; a guard, for those who compile without exceptions.
+    struct Insertion {
+      DescriptorIndex& index;
+      std::span<const PointId> ids;
+      std::size_t done = 0;
+
+      Insertion(DescriptorIndex& into, std::span<const PointId> of) : index(into), ids(of) {}
+      Insertion(const Insertion&) = delete;
+      Insertion& operator=(const Insertion&) = delete;
+      ~Insertion() {
+        if (done == ids.size()) return;
+        --index.size_;
+        while (done > 0) {
+          index.cells_.erase(ids[--done]);
+          --index.size_;
+        }
       }
-    } catch (...) {
-      --size_;
-      while (done > 0) {
-        cells_.erase(ids[--done]);
-        --size_;
-      }
-      throw;
+    } insertion(*this, ids);
+    for (; insertion.done < ids.size(); ++insertion.done) {
+      ++size_;
+      cells_.insert(ids[insertion.done], &codes[insertion.done * dim], 2 * in_cell());
     }
     error_ = error;
     inside_ = inside;
