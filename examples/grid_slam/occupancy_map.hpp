@@ -14,7 +14,6 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <numbers>
 #include <optional>
 #include <vector>
@@ -67,7 +66,7 @@ struct FromMatch {
   /// where furniture was moved, a wrong place gains half a nat and now and then a whole one. A robot that
   /// drives the other way unseen makes the likely place wrong by two steps, which costs two.
   double rare_gain = 0.8, rare_change_gain = 1.3;
-  /// As the filter's. Motions are drawn by as much of their evidence as counts: one that a single scan
+  /// As the filter's. Rare motions are drawn by as much of what they gain as counts: one that a single scan
   /// favours leaves some particles to the others, and the scans after it decide.
   double evidence_share = 1;
   double widened = 1.0;  ///< standard deviations of the draws over those fitted
@@ -88,10 +87,7 @@ struct FromMatch {
     drop_unfounded(peaks, map.model.independence * static_cast<double>(z.size()));
     if (peaks.empty()) return cairn::FromMotion{}(map, motion, z, random);
     // Likely motions by all of their evidence, rare ones by what counts of what they gain over those.
-    double likely = -std::numeric_limits<double>::infinity();
-    for (const Peak& peak : peaks)
-      if (peak.mode->share >= likely_share) likely = std::max(likely, peak.log_evidence);
-    if (!std::isfinite(likely)) likely = peaks.front().log_evidence;
+    const double likely = likely_evidence(peaks).value_or(peaks.front().log_evidence);
     std::vector<double> shares;  // of the motions, once the scan is seen: logarithms
     for (const Peak& peak : peaks) {
       const double counts = peak.mode->share >= likely_share ? 1 : evidence_share;
@@ -135,16 +131,23 @@ private:
     std::vector<cairn::ScanPoint> few;
   };
 
+  /// Of the likely motions that explain the scan at all, the best one's.
+  [[nodiscard]] std::optional<double> likely_evidence(const std::vector<Peak>& peaks) const {
+    std::optional<double> best;
+    for (const Peak& peak : peaks)
+      if (peak.mode->share >= likely_share)
+        best = std::max(best.value_or(peak.log_evidence), peak.log_evidence);
+    return best;
+  }
+
   /// Rare motions go that do not gain enough over the likely ones; the first of all is the likeliest.
   void drop_unfounded(std::vector<Peak>& peaks, double beams) const {
-    double likely = -std::numeric_limits<double>::infinity();
-    for (const Peak& peak : peaks)
-      if (peak.mode->share >= likely_share) likely = std::max(likely, peak.log_evidence);
-    if (peaks.empty()) return;
+    const std::optional<double> likely = likely_evidence(peaks);
+    if (!likely) return;
     const std::size_t regime = peaks.front().mode->regime;
     std::erase_if(peaks, [&](const Peak& peak) {
       const double gain = peak.mode->regime == regime ? rare_gain : rare_change_gain;
-      return peak.mode->share < rare_share && peak.log_evidence < likely + gain * beams;
+      return peak.mode->share < rare_share && peak.log_evidence < *likely + gain * beams;
     });
   }
 
