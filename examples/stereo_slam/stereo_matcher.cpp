@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <ranges>
+#include <utility>
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/parallel.hpp>
@@ -28,7 +30,9 @@ namespace {
 constexpr float unmatched = std::numeric_limits<float>::max();
 constexpr std::uint32_t nobody = std::numeric_limits<std::uint32_t>::max();
 
-struct Best {
+}  // namespace
+
+struct StereoMatcher::Best {
   float distance = unmatched;
   std::uint32_t index = nobody;
 
@@ -39,7 +43,12 @@ struct Best {
   }
 };
 
-}  // namespace
+/// Who is nearest to whom by descriptor, among those that may match; distances are squared.
+struct StereoMatcher::Nearest {
+  std::vector<Best> of_left;
+  std::vector<float> second_of_left;
+  std::vector<Best> of_right;
+};
 
 StereoMatcher::StereoMatcher(const cairn::StereoRig& rig, const StereoMatcherOptions& options)
     : rig_(rig), options_(options), focal_(rig.left.fy()) {
@@ -74,55 +83,79 @@ std::vector<StereoMatcher::RowPoint> StereoMatcher::to_rows(const cairn::Feature
   return points;
 }
 
+/// The right points by row, so that those near a row are found by bisection.
+class StereoMatcher::Rows {
+public:
+  explicit Rows(std::vector<RowPoint> points) : points_(std::move(points)) {
+    std::ranges::sort(points_, [](const RowPoint& a, const RowPoint& b) {
+      return a.row != b.row ? a.row < b.row : a.index < b.index;
+    });
+  }
+  /// All that are at most `band` away from a row.
+  [[nodiscard]] auto near(float row, float band) const {
+    const auto first = std::ranges::lower_bound(points_, row - band, {}, &RowPoint::row);
+    return std::ranges::subrange(
+        first, std::ranges::upper_bound(first, points_.end(), row + band, {}, &RowPoint::row));
+  }
+
+private:
+  std::vector<RowPoint> points_;
+};
+
+/// Whether two points can be of one place, before their descriptors are looked at.
+bool StereoMatcher::may_match(const RowPoint& left, const RowPoint& right) const {
+  const float disparity = left.column - right.column;
+  const float ratio = right.scale / left.scale;
+  return disparity >= least_disparity_ && disparity <= most_disparity_ && right.sign == left.sign &&
+         ratio <= options_.scale_ratio && ratio * options_.scale_ratio >= 1;
+}
+
+StereoMatcher::Nearest StereoMatcher::nearest(const cairn::Features& left, const cairn::Features& right,
+                                              unsigned threads) const {
+  const std::vector<RowPoint> points = to_rows(left, rig_.left, R_rows_left_);
+  const Rows rows(to_rows(right, rig_.right, R_rows_right_));
+  const std::size_t blocks = std::max(threads, 1U);
+  Nearest result{std::vector<Best>(left.size()), std::vector<float>(left.size(), unmatched), {}};
+  std::vector<std::vector<Best>> of_right(blocks, std::vector<Best>(right.size()));
+  const auto match_left = [&](const RowPoint& point, std::vector<Best>& backward) {
+    Best& best = result.of_left[point.index];
+    float& second = result.second_of_left[point.index];
+    const float band = static_cast<float>(options_.band) * std::max(1.0F, 0.5F * point.scale);
+    for (const RowPoint& candidate : rows.near(point.row, band)) {
+      if (!may_match(point, candidate)) continue;
+      const float distance =
+          squared_distance(left.descriptor(point.index), right.descriptor(candidate.index));
+      second = std::min(second, std::max(distance, best.distance));
+      best.offer(distance, candidate.index);
+      backward[candidate.index].offer(distance, point.index);
+    }
+  };
+  cairn::parallel_for(blocks, threads, [&](std::size_t first, std::size_t last) {
+    for (std::size_t block = first; block < last; ++block) {
+      const std::size_t end = points.size() * (block + 1) / blocks;
+      for (std::size_t i = points.size() * block / blocks; i < end; ++i)
+        match_left(points[i], of_right[block]);
+    }
+  });
+  for (std::size_t block = 1; block < blocks; ++block)
+    for (std::size_t i = 0; i < right.size(); ++i)
+      of_right[0][i].offer(of_right[block][i].distance, of_right[block][i].index);
+  result.of_right = std::move(of_right[0]);
+  return result;
+}
+
 std::vector<PointPair> StereoMatcher::operator()(cairn::ImageView left_image, const cairn::Features& left,
                                                  cairn::ImageView right_image, const cairn::Features& right,
                                                  unsigned threads) const {
   CAIRN_EXPECTS(left.dimension == right.dimension, "stereo matcher: descriptors of two kinds");
-  const std::vector<RowPoint> left_points = to_rows(left, rig_.left, R_rows_left_);
-  std::vector<RowPoint> right_points = to_rows(right, rig_.right, R_rows_right_);
-  std::ranges::sort(right_points, [](const RowPoint& a, const RowPoint& b) {
-    return a.row != b.row ? a.row < b.row : a.index < b.index;
-  });
-
-  std::vector<Best> best_of_left(left.size());
-  std::vector<float> second_of_left(left.size(), unmatched);
-  std::vector<std::vector<Best>> best_of_right(std::max(threads, 1U), std::vector<Best>(right.size()));
-  const auto match_left = [&](const RowPoint& point, std::vector<Best>& backward) {
-    Best& best = best_of_left[point.index];
-    float& second = second_of_left[point.index];
-    const float band = static_cast<float>(options_.band) * std::max(1.0F, 0.5F * point.scale);
-    auto candidate = std::ranges::lower_bound(right_points, point.row - band, {}, &RowPoint::row);
-    for (; candidate != right_points.end() && candidate->row <= point.row + band; ++candidate) {
-      const float disparity = point.column - candidate->column;
-      if (disparity < least_disparity_ || disparity > most_disparity_ || candidate->sign != point.sign)
-        continue;
-      const float ratio = candidate->scale / point.scale;
-      if (ratio > options_.scale_ratio || ratio * options_.scale_ratio < 1) continue;
-      const float distance =
-          squared_distance(left.descriptor(point.index), right.descriptor(candidate->index));
-      second = std::min(second, std::max(distance, best.distance));
-      best.offer(distance, candidate->index);
-      backward[candidate->index].offer(distance, point.index);
-    }
-  };
-  cairn::parallel_for(best_of_right.size(), threads, [&](std::size_t first, std::size_t last) {
-    for (std::size_t block = first; block < last; ++block) {
-      const std::size_t begin = left_points.size() * block / best_of_right.size();
-      const std::size_t end = left_points.size() * (block + 1) / best_of_right.size();
-      for (std::size_t i = begin; i < end; ++i) match_left(left_points[i], best_of_right[block]);
-    }
-  });
-  for (std::size_t block = 1; block < best_of_right.size(); ++block)
-    for (std::size_t i = 0; i < right.size(); ++i)
-      best_of_right[0][i].offer(best_of_right[block][i].distance, best_of_right[block][i].index);
-
+  const Nearest nearest_ones = nearest(left, right, threads);
   std::vector<PointPair> matches;
   const float ratio_squared = options_.distance_ratio * options_.distance_ratio;
   for (std::size_t i = 0; i < left.size(); ++i) {
-    const Best& best = best_of_left[i];
-    if (best.index == nobody || best_of_right[0][best.index].index != i) continue;
+    const Best& best = nearest_ones.of_left[i];
+    if (best.index == nobody || nearest_ones.of_right[best.index].index != i) continue;
     if (best.distance > options_.max_distance * options_.max_distance) continue;
-    if (best.distance > ratio_squared * second_of_left[i]) continue;
+    if (best.distance > ratio_squared * nearest_ones.second_of_left[i]) continue;
     const cairn::Keypoint& l = left.keypoints[i];
     const cairn::Keypoint& r = right.keypoints[best.index];
     matches.push_back({static_cast<std::uint32_t>(i), best.index, {l.x, l.y}, {r.x, r.y}, false});

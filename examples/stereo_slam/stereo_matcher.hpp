@@ -56,9 +56,15 @@ public:
 
 private:
   struct RowPoint;
+  class Rows;
+  struct Best;
+  struct Nearest;
   [[nodiscard]] std::vector<RowPoint> to_rows(const cairn::Features& features,
                                               const cairn::PinholeCamera& camera,
                                               const cairn::Matrix<3>& rotation) const;
+  [[nodiscard]] bool may_match(const RowPoint& left, const RowPoint& right) const;
+  [[nodiscard]] Nearest nearest(const cairn::Features& left, const cairn::Features& right,
+                                unsigned threads) const;
   void refine(PointPair& match, cairn::ImageView left, cairn::ImageView right) const;
 
   cairn::StereoRig rig_;

@@ -30,36 +30,42 @@ namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
-/// to += A^T A for few columns; the lower triangle and little beside it. Nine sums at a time share their
-/// loads: half of the time of Eigen's rankUpdate, which is made for many columns.
-template <int K>
-void add_squares(const Matrix<dynamic, K>& a, Matrix<K>& to) {
+/// sums[u][t] = the product of columns left[t] and right[u] over rows first ... end - 1: nine sums that share
+/// their loads.
+inline void sums_of_products(const double* const (&left)[3], const double* const (&right)[3],
+                             Eigen::Index first, Eigen::Index end, double (&sums)[3][3]) {
   using Lane = RegisterFor<double, 4>;
   constexpr int width = lane_count<double, 4>;
+  Lane lanes[3][3] = {};
+  Eigen::Index r = first;
+  for (; r + width <= end; r += width)
+    each<3>([&](int u) __attribute__((always_inline)) {
+      const Lane y = load<Lane>(right[u] + r);
+      each<3>([&](int t) { lanes[u][t] += load<Lane>(left[t] + r) * y; });
+    });
+  for (int u = 0; u < 3; ++u)
+    for (int t = 0; t < 3; ++t) {
+      double sum = 0;
+      for (int k = 0; k < width; ++k) sum += lanes[u][t][k];
+      for (Eigen::Index k = r; k < end; ++k) sum += left[t][k] * right[u][k];
+      sums[u][t] = sum;
+    }
+}
+
+/// to += A^T A for few columns; the lower triangle and little beside it. Half of the time of Eigen's
+/// rankUpdate, which is made for many columns.
+template <int K>
+void add_squares(const Matrix<dynamic, K>& a, Matrix<K>& to) {
   constexpr Eigen::Index piece = 256;  // rows of which all columns stay in the first cache
+  const auto column = [&](int k) { return a.data() + std::min(k, K - 1) * a.rows(); };  // past the last, that
   for (Eigen::Index first = 0; first < a.rows(); first += piece)
     for (int j = 0; j < K; j += 3)
       for (int i = j; i < K; i += 3) {
-        const double *left[3], *right[3];  // past the last column that one again, which nobody reads
-        for (int t = 0; t < 3; ++t) {
-          left[t] = a.data() + std::min(i + t, K - 1) * a.rows();
-          right[t] = a.data() + std::min(j + t, K - 1) * a.rows();
-        }
-        Lane sums[3][3] = {};
-        const Eigen::Index end = std::min(first + piece, a.rows());
-        Eigen::Index r = first;
-        for (; r + width <= end; r += width)
-          each<3>([&](int u) __attribute__((always_inline)) {
-            const Lane y = load<Lane>(right[u] + r);
-            each<3>([&](int t) { sums[u][t] += load<Lane>(left[t] + r) * y; });
-          });
+        double sums[3][3];
+        sums_of_products({column(i), column(i + 1), column(i + 2)}, {column(j), column(j + 1), column(j + 2)},
+                         first, std::min(first + piece, a.rows()), sums);
         for (int u = 0; u < 3 && j + u < K; ++u)
-          for (int t = 0; t < 3 && i + t < K; ++t) {
-            double sum = 0;
-            for (int k = 0; k < width; ++k) sum += sums[u][t][k];
-            for (Eigen::Index k = r; k < end; ++k) sum += left[t][k] * right[u][k];
-            to(i + t, j + u) += sum;
-          }
+          for (int t = 0; t < 3 && i + t < K; ++t) to(i + t, j + u) += sums[u][t];
       }
 }
 

@@ -140,55 +140,12 @@ struct Unscented {
     requires(MeasurementModel<H> || detail::explain_sensor<H>)
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
       Gaussian<typename H::State>& belief, const H& sensor, const V& z) const {
-    using X = typename H::State;
-    using Z = typename H::Measurement;
-    using S = ScalarOf<X>;
-    constexpr int m = dof<Z>;
     const int size = detail::common_size(belief.mean, belief.covariance);
     const detail::PlainSensor plain(sensor, size, z);
     if (plain.misfit()) return detail::misfitting(plain);
     const double c2 = points.spread_squared(size);
     if (!(c2 > 0.0)) return refused(belief, plain, Status::bad_option);
-    const auto f = [&](const auto& x) { return plain.predict(x); };
-    const detail::PointFunction<detail::is_vectorised<H>, decltype(f)> h{f};
-    if constexpr (dof<X> == dynamic || m == dynamic) {
-      CovarianceOf<X> root = belief.covariance;
-      if (!detail::checked_root<dof<X>, S>(belief.covariance, root))
-        return refused(belief, plain, refusal<X>(belief));
-      const auto out = detail::unscented_transform(
-          belief.mean, root, [&](const X& x) -> Z { return plain.predict(x); }, c2, beta_minus_alpha2());
-      const Matrix<m, m, S> r = detail::dense_of(plain.noise(belief.mean));
-      if (plain.misfit()) return detail::misfitting(plain);
-      auto in = detail::fresh_innovation<m, S>(local(out.mean, plain.z()), out.covariance);
-      in.covariance += r;
-      const S digits = detail::digits_of_points(belief.mean, belief.covariance, out.mean, in.covariance);
-      detail::correct_by_moments<X, m, S>(belief, out.cross, in, gate, digits,
-                                          by_array(belief, plain, r, in, c2, digits));
-      return in;
-    } else {
-      constexpr int n = dof<X>;
-      detail::Column<n, S> root[n];
-      if (!detail::covariance_root(belief.covariance, root)) [[unlikely]]
-        return refused(belief, plain, refusal<X>(belief));
-      const Z center = plain.predict(belief.mean);
-      auto moments = detail::sum_points<detail::Pairs::with_cross>(
-          belief.mean, root, h, detail::spread<S>(c2), beta_minus_alpha2(), center);
-      Tangent<Z> mean;
-      moments.mean.store(mean.data());
-      Innovation<m, S> in;
-      in.residual = local(Z(retract(center, mean)), plain.z());
-      const Matrix<m, m, S> r = detail::dense_of(plain.noise(belief.mean));
-      if (plain.misfit()) return detail::misfitting(plain);
-      detail::each<m>([&](int b) __attribute__((always_inline)) {
-        detail::each<m>(b, m, [&](int a) {
-          in.covariance(a, b) = in.covariance(b, a) = moments.covariance[b][a] + r(a, b);
-        });
-      });
-      const S digits = detail::digits_of_points(belief.mean, belief.covariance, center, in.covariance);
-      detail::correct_by_moments<X, m, S>(belief, moments.cross, in, gate, digits,
-                                          by_array(belief, plain, r, in, c2, digits));
-      return in;
-    }
+    return updated(belief, plain, c2);
   }
 
 private:
@@ -217,6 +174,63 @@ private:
                                          detail::view(update.white), detail::view(update.step),
                                          detail::view(y), digits, update, numbers.data());
     };
+  }
+
+  /// Update for sizes known at compile time.
+  template <Manifold X, class H, class V>
+    requires(dof<X> != dynamic && dof<typename H::Measurement> != dynamic)
+  [[gnu::always_inline]] Innovation<dof<typename H::Measurement>, ScalarOf<X>> updated(
+      Gaussian<X>& belief, const detail::PlainSensor<H, V>& plain, double c2) const {
+    using Z = typename H::Measurement;
+    using S = ScalarOf<X>;
+    constexpr int n = dof<X>, m = dof<Z>;
+    detail::Column<n, S> root[n];
+    if (!detail::covariance_root(belief.covariance, root)) [[unlikely]]
+      return refused(belief, plain, refusal<X>(belief));
+    const Z center = plain.predict(belief.mean);
+    const auto f = [&](const auto& x) { return plain.predict(x); };
+    const detail::PointFunction<detail::is_vectorised<H>, decltype(f)> h{f};
+    auto moments = detail::sum_points<detail::Pairs::with_cross>(belief.mean, root, h, detail::spread<S>(c2),
+                                                                 beta_minus_alpha2(), center);
+    Tangent<Z> mean;
+    moments.mean.store(mean.data());
+    Innovation<m, S> in;
+    in.residual = local(Z(retract(center, mean)), plain.z());
+    const Matrix<m, m, S> r = detail::dense_of(plain.noise(belief.mean));
+    if (plain.misfit()) return detail::misfitting(plain);
+    detail::each<m>([&](int b) __attribute__((always_inline)) {
+      detail::each<m>(b, m, [&](int a) {
+        in.covariance(a, b) = in.covariance(b, a) = moments.covariance[b][a] + r(a, b);
+      });
+    });
+    const S digits = detail::digits_of_points(belief.mean, belief.covariance, center, in.covariance);
+    detail::correct_by_moments<X, m, S>(belief, moments.cross, in, gate, digits,
+                                        by_array(belief, plain, r, in, c2, digits));
+    return in;
+  }
+
+  /// The same for sizes known at run time, where points go one by one.
+  template <Manifold X, class H, class V>
+    requires(dof<X> == dynamic || dof<typename H::Measurement> == dynamic)
+  Innovation<dof<typename H::Measurement>, ScalarOf<X>> updated(Gaussian<X>& belief,
+                                                                const detail::PlainSensor<H, V>& plain,
+                                                                double c2) const {
+    using Z = typename H::Measurement;
+    using S = ScalarOf<X>;
+    constexpr int m = dof<Z>;
+    CovarianceOf<X> root = belief.covariance;
+    if (!detail::checked_root<dof<X>, S>(belief.covariance, root))
+      return refused(belief, plain, refusal<X>(belief));
+    const auto out = detail::unscented_transform(
+        belief.mean, root, [&](const X& x) -> Z { return plain.predict(x); }, c2, beta_minus_alpha2());
+    const Matrix<m, m, S> r = detail::dense_of(plain.noise(belief.mean));
+    if (plain.misfit()) return detail::misfitting(plain);
+    auto in = detail::fresh_innovation<m, S>(local(out.mean, plain.z()), out.covariance);
+    in.covariance += r;
+    const S digits = detail::digits_of_points(belief.mean, belief.covariance, out.mean, in.covariance);
+    detail::correct_by_moments<X, m, S>(belief, out.cross, in, gate, digits,
+                                        by_array(belief, plain, r, in, c2, digits));
+    return in;
   }
 
   /// Predict for sizes known at compile time.

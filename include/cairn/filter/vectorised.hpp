@@ -60,6 +60,31 @@ inline constexpr bool is_vectorised = false;
 template <class Model>
 inline constexpr bool is_vectorised<Vectorised<Model>> = true;
 
+/// What came out of N points that were sent in packs, as differences of M numbers from a reference: a pack
+/// holds one of the numbers for as many points as it has lanes.
+template <int N, int M, class S>
+class PackedDifferences {
+public:
+  static constexpr int width = Column<N, S>::width;
+  static constexpr int batches = Column<N, S>::count;
+
+  [[gnu::always_inline]] void put(int batch, const Vector<M, Pack<S, width>>& differences) {
+    each<M>(
+        [&](int a) { std::memcpy(numbers_[a] + batch * width, &differences(a).lanes, width * sizeof(S)); });
+  }
+  /// That of point i; points from N on are those that went along in free lanes.
+  [[gnu::always_inline]] Column<M, S> of_point(int i) const {
+    S numbers[M];
+    each<M>([&](int a) { numbers[a] = numbers_[a][i]; });
+    Column<M, S> result;
+    result.gather(numbers);
+    return result;
+  }
+
+private:
+  S numbers_[M][batches * width];
+};
+
 /// send_points() of sigma_moments.hpp with as many points at once as a register of a column has lanes. The
 /// centre goes along, in a lane that is free or by itself, so that all differences are taken between numbers
 /// that were computed alike.
@@ -67,46 +92,40 @@ template <Manifold X, class F, class Y, int N, int M, class S>
 [[gnu::always_inline]] inline void send_packs(const X& x, const Column<N, S> (&root)[N], const F& f,
                                               const S& c, const Y& center, Column<M, S> (&up)[N],
                                               Column<M, S> (&down)[N]) {
-  constexpr int w = Column<N, S>::width;
-  constexpr int count = Column<N, S>::count;
+  using Differences = PackedDifferences<N, M, S>;
+  constexpr int w = Differences::width;
   static_assert(w > 1, "vectorised() needs float or double");
   using P = Pack<S, w>;
   using PX = typename Recast<X, P>::type;
   using PY = typename Recast<Y, P>::type;
   const PX start = Recast<X, P>::of(x);
   const PY reference = Recast<Y, P>::of(center);
-  Column<N, S> rows[N];  // row a of c times the root: number a of the steps, one point to a lane
+  Column<N, S> rows[N];  // row a of the root: number a of the steps, one point to a lane
   transpose(root, rows);
-  S differences[2][M][count * w];
-  S offset[M];
-  const auto send = [&](int batch, int sign) __attribute__((always_inline)) {
+  const auto send = [&](int batch, const S& scale) __attribute__((always_inline)) {
     Vector<N, P> step;
-    each<N>([&](int a) { step(a) = P::of(rows[a].lanes[batch] * (sign == 0 ? c : -c)); });
+    each<N>([&](int a) { step(a) = P::of(rows[a].lanes[batch] * scale); });
     const PY there = f(retract(start, step));
-    const Vector<M, P> d = local(reference, there);
-    each<M>([&](int a) { std::memcpy(differences[sign][a] + batch * w, &d(a).lanes, sizeof(P)); });
+    return Vector<M, P>(local(reference, there));
   };
-  for (int batch = 0; batch < count; ++batch) {
-    send(batch, 0);
-    send(batch, 1);
+  Differences above, below;
+  for (int batch = 0; batch < Differences::batches; ++batch) {
+    above.put(batch, send(batch, c));
+    below.put(batch, send(batch, -c));
   }
+  Column<M, S> origin;
   if constexpr (N % w != 0) {
-    each<M>([&](int a) { offset[a] = differences[0][a][N]; });
+    origin = above.of_point(N);  // lanes past the last point took no step
   } else {
     const PY there = f(start);
     const Vector<M, P> d = local(reference, there);
+    S offset[M];
     each<M>([&](int a) { offset[a] = d(a)[0]; });
+    origin.gather(offset);
   }
-  Column<M, S> origin;
-  origin.gather(offset);
   each<N>([&](int i) {
-    S above[M], below[M];
-    each<M>([&](int a) {
-      above[a] = differences[0][a][i];
-      below[a] = differences[1][a][i];
-    });
-    up[i].gather(above);
-    down[i].gather(below);
+    up[i] = above.of_point(i);
+    down[i] = below.of_point(i);
     up[i].subtract(origin, S(1));
     down[i].subtract(origin, S(1));
   });

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstddef>
+#include <type_traits>
 #include <utility>
 
 #include <cairn/filter/detail/register_column.hpp>
@@ -106,30 +107,43 @@ template <class S, int W, class Lane>
   });
 }
 
+/// f(Row, Column) for every pair of numbers below Count, both known at compile time.
+template <int Count, class F>
+[[gnu::always_inline]] inline void unrolled_pairs(const F& f) {
+  unrolled<static_cast<std::size_t>(Count * Count)>([&](auto pair) __attribute__((always_inline)) {
+    constexpr int number = static_cast<int>(pair);
+    f(std::integral_constant<int, number % Count>{}, std::integral_constant<int, number / Count>{});
+  });
+}
+
+/// The W x W block of a square matrix in block row Row and block column Col, transposed: lane l of block[i]
+/// is what stands in row Row W + i and column Col W + l; zero past the last column.
+template <int Row, int Col, int N, class S, int W, class Lane>
+[[gnu::always_inline]] inline void load_transposed(const Column<N, S> (&from)[N], Lane (&block)[W]) {
+  unrolled<static_cast<std::size_t>(W)>([&](auto lane) __attribute__((always_inline)) {
+    constexpr int j = Col * W + static_cast<int>(lane);
+    if constexpr (j < N)
+      block[lane] = from[j].lanes[Row];
+    else
+      block[lane] = Lane{};
+  });
+  transpose_lanes<S, W>(block);
+}
+
 /// to = from^T for square matrices.
 template <int N, class S>
 [[gnu::always_inline]] inline void transpose(const Column<N, S> (&from)[N], Column<N, S> (&to)[N]) {
   constexpr int w = Column<N, S>::width;
-  constexpr int count = Column<N, S>::count;
   if constexpr (w == 1) {
     for (int j = 0; j < N; ++j)
       for (int i = 0; i < N; ++i) to[i].lanes[j] = from[j].lanes[i];
   } else {
-    unrolled<static_cast<std::size_t>(count * count)>([&](auto pair) __attribute__((always_inline)) {
-      constexpr int columns = static_cast<int>(pair) / count;
-      constexpr int rows = static_cast<int>(pair) % count;
+    unrolled_pairs<Column<N, S>::count>([&](auto row, auto column) __attribute__((always_inline)) {
       typename Column<N, S>::Lane block[w];
+      load_transposed<row(), column()>(from, block);
       unrolled<static_cast<std::size_t>(w)>([&](auto lane) __attribute__((always_inline)) {
-        constexpr int j = columns * w + static_cast<int>(lane);
-        if constexpr (j < N)
-          block[lane] = from[j].lanes[rows];
-        else
-          block[lane] = typename Column<N, S>::Lane{};
-      });
-      transpose_lanes<S, w>(block);
-      unrolled<static_cast<std::size_t>(w)>([&](auto lane) __attribute__((always_inline)) {
-        constexpr int i = rows * w + static_cast<int>(lane);
-        if constexpr (i < N) to[i].lanes[columns] = block[lane];
+        constexpr int i = row() * w + static_cast<int>(lane);
+        if constexpr (i < N) to[i].lanes[column()] = block[lane];
       });
     });
   }
@@ -145,24 +159,21 @@ template <int N, class S>
     for (int j = 0; j < N; ++j)
       for (int i = j + 1; i < N; ++i) columns[i].lanes[j] = columns[j].lanes[i];
   } else {
-    using Lane = typename Column<N, S>::Lane;
-    constexpr int blocks = Column<N, S>::count;
-    unrolled<static_cast<std::size_t>(blocks * blocks)>([&](auto pair) __attribute__((always_inline)) {
-      constexpr int from = static_cast<int>(pair) / blocks;  // the block of columns
-      constexpr int to = static_cast<int>(pair) % blocks;    // the block of rows, which become columns
-      if constexpr (to >= from) {
-        Lane block[w];
-        for (int l = 0; l < w; ++l) block[l] = from * w + l < N ? columns[from * w + l].lanes[to] : Lane{};
-        transpose_lanes<S, w>(block);
-        unrolled<static_cast<std::size_t>(N - to * w < w ? N - to * w : w)>(
-            [&](auto lane) __attribute__((always_inline)) {
-              constexpr int l = static_cast<int>(lane);
-              Lane& target = columns[to * w + l].lanes[from];
-              if constexpr (from == to)  // above the diagonal is what stands before lane l
-                target = shuffled<S, w, PickHead<w, l>>(target, block[l]);
-              else
-                target = block[l];
-            });
+    unrolled_pairs<Column<N, S>::count>([&](auto row, auto column) __attribute__((always_inline)) {
+      if constexpr (row() >= column()) {
+        typename Column<N, S>::Lane block[w];
+        load_transposed<row(), column()>(columns, block);
+        unrolled<static_cast<std::size_t>(w)>([&](auto lane) __attribute__((always_inline)) {
+          constexpr int l = static_cast<int>(lane);
+          constexpr int mirrored = row() * w + l;  // the rows of the block become columns
+          if constexpr (mirrored < N) {
+            auto& target = columns[mirrored].lanes[column()];
+            if constexpr (row() == column())  // above the diagonal is what stands before lane l
+              target = shuffled<S, w, PickHead<w, l>>(target, block[l]);
+            else
+              target = block[l];
+          }
+        });
       }
     });
   }
