@@ -37,7 +37,7 @@ struct BatchOptions {
 
 /// Searches for each of the queries with the collector of the same number. Returns true where each answer is
 /// exact. Throws Error, naming the query, before any search where one is not finite or of another dimension.
-template <Index I, PointSet Queries, Collector<typename I::Real> C>
+template <Index I, QueryPoints Queries, Collector<typename I::Real> C>
 bool search_batch(const I& index, const Queries& queries, std::span<C> collectors,
                   const BatchOptions& options = {}) {
   using Real = typename I::Real;
@@ -63,7 +63,7 @@ bool search_batch(const I& index, const Queries& queries, std::span<C> collector
   if (options.work != nullptr) *options.work += work;
   return exact;
 }
-template <Index I, PointSet Queries, Collector<typename I::Real> C>
+template <Index I, QueryPoints Queries, Collector<typename I::Real> C>
 bool search_batch(const I& index, const Queries& queries, std::vector<C>& collectors,
                   const BatchOptions& options = {}) {
   return search_batch(index, queries, std::span<C>(collectors), options);
@@ -71,7 +71,7 @@ bool search_batch(const I& index, const Queries& queries, std::vector<C>& collec
 
 /// The k nearest points of each query, nearest first: those of query i from i k on. Where a search found
 /// fewer, the rest of its k are no_point, infinitely far. Throws as search_batch().
-template <Index I, PointSet Queries>
+template <Index I, QueryPoints Queries>
 [[nodiscard]] std::vector<typename I::Hit> nearest_batch(const I& index, const Queries& queries,
                                                          std::size_t k, const BatchOptions& options = {}) {
   using Real = typename I::Real;

@@ -87,7 +87,7 @@ private:
 };
 
 /// The corners of a box, low before high, checked and brought to the index's coordinates.
-template <class Index, Point Low, Point High>
+template <class Index, QueryPoint Low, QueryPoint High>
 [[nodiscard]] std::vector<typename Index::Real> corners_of(const Index& index, const Low& low,
                                                            const High& high) {
   const std::size_t dim = index.dimension();
@@ -104,7 +104,7 @@ template <class Index, Point Low, Point High>
 /// order. Throws Error for corners that are not finite or have another dimension; a box whose low is above
 /// its high holds nothing. On a circle low to high is the arc that begins at low, the whole circle where it
 /// is a period long. O(n^(1 - 1/dim) + found).
-template <class Scalar, std::size_t Dim, class M, Point Low, Point High, class Visit>
+template <class Scalar, std::size_t Dim, class M, QueryPoint Low, QueryPoint High, class Visit>
 void visit_inside(const KdTree<Scalar, Dim, M>& tree, const Low& low, const High& high, Visit&& visit) {
   using Tree = KdTree<Scalar, Dim, M>;
   if (tree.empty()) return;
@@ -115,7 +115,7 @@ void visit_inside(const KdTree<Scalar, Dim, M>& tree, const Low& low, const High
 }
 
 /// The same of BruteForce, in the order of the set. O(n).
-template <class Scalar, std::size_t Dim, class M, Point Low, Point High, class Visit>
+template <class Scalar, std::size_t Dim, class M, QueryPoint Low, QueryPoint High, class Visit>
 void visit_inside(const BruteForce<Scalar, Dim, M>& index, const Low& low, const High& high, Visit&& visit) {
   using Real = typename BruteForce<Scalar, Dim, M>::Real;
   if (index.empty()) return;
@@ -130,7 +130,7 @@ void visit_inside(const BruteForce<Scalar, Dim, M>& index, const Low& low, const
 }
 
 /// Their ids.
-template <class Scalar, std::size_t Dim, class M, Point Low, Point High>
+template <class Scalar, std::size_t Dim, class M, QueryPoint Low, QueryPoint High>
 [[nodiscard]] std::vector<PointId> inside(const KdTree<Scalar, Dim, M>& tree, const Low& low,
                                           const High& high) {
   std::vector<PointId> found;
@@ -138,7 +138,7 @@ template <class Scalar, std::size_t Dim, class M, Point Low, Point High>
   return found;
 }
 
-template <class Scalar, std::size_t Dim, class M, Point Low, Point High>
+template <class Scalar, std::size_t Dim, class M, QueryPoint Low, QueryPoint High>
 [[nodiscard]] std::vector<PointId> inside(const BruteForce<Scalar, Dim, M>& index, const Low& low,
                                           const High& high) {
   std::vector<PointId> found;

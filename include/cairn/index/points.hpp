@@ -130,6 +130,9 @@ concept MatrixThatGoes =
 /// functions of an index, not for asking whether a type is a point.
 template <class Q>
 concept QueryPoint = Point<Q> || detail::explain_query<Q>;
+/// The same of a set of them.
+template <class S>
+concept QueryPoints = PointSet<S> || detail::explain_points<S>;
 
 /// Flat memory seen as points: `dim` numbers each, one after the other. A temporary that owns its numbers is
 /// refused. The rows or the columns of a matrix
