@@ -76,7 +76,8 @@ SE3 mounted() {
 SO3 levelled(const SE3& T_world_vehicle, double sigma, Random& random) {
   const Matrix<3> R = T_world_vehicle.rotation().matrix();
   const SO3 unturned = SO3::exp(Vector<3>(0, 0, -std::atan2(R(1, 0), R(0, 0)))) * T_world_vehicle.rotation();
-  return SO3::exp(Vector<3>(sigma * random.normal(), sigma * random.normal(), 0)) * unturned;
+  const double pitch = sigma * random.normal(), roll = sigma * random.normal();
+  return SO3::exp(Vector<3>(roll, pitch, 0)) * unturned;
 }
 
 /// What the camera sees of the ground by its disparity, by rays a few pixels apart.
@@ -118,9 +119,9 @@ std::vector<cairn::StereoMatch> followed(const Terrain& terrain, const SE3& befo
                shift_v = options.common_sigma * random.normal();
   std::vector<cairn::StereoMatch> matches;
   for (std::size_t tries = 0; matches.size() < count && tries < 20 * count; ++tries) {
-    const Vector<3> ray =
-        Vector<3>(random.uniform(-0.5, 0.5) * width / focal, random.uniform(-0.5, 0.5) * height / focal, 1)
-            .normalized();
+    const double ray_y = random.uniform(-0.5, 0.5) * height / focal,
+                 ray_x = random.uniform(-0.5, 0.5) * width / focal;
+    const Vector<3> ray = Vector<3>(ray_x, ray_y, 1).normalized();
     const auto ground = terrain.hit(before.translation(), before.rotation().rotate(ray), 2 * reach);
     if (!ground) continue;
     const auto first = cameras.project(before.inverse() * *ground),

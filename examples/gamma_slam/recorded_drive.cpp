@@ -137,8 +137,8 @@ TerrainScan step_of(const cairn::StereoPose& pose, const GroundView& before, con
 void perturb(TerrainScan& scan, const OdometryNoise& noise, Random& random) {
   const double d = scan.moved.translation().norm();
   const Vector<3> sigma(noise.along * d, noise.side * d, noise.turn * std::numbers::pi / 180);
-  const Vector<3> draw(random.normal(), random.normal(), random.normal());
-  scan.moved = cairn::retract(scan.moved, Vector<3>(sigma.cwiseProduct(draw)));
+  const double turn = random.normal(), side = random.normal(), along = random.normal();
+  scan.moved = cairn::retract(scan.moved, Vector<3>(sigma.cwiseProduct(Vector<3>(along, side, turn))));
   scan.moved_covariance += Matrix<3>(sigma.cwiseAbs2().asDiagonal());
 }
 

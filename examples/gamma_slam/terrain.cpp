@@ -14,9 +14,11 @@ using cairn::Vector;
 Terrain::Terrain(std::uint64_t seed) : heights_(static_cast<std::size_t>(side) * side) {
   cairn::Random random(seed);
   const auto anywhere = [&] { return random.uniform(-half_side, half_side); };
-  for (int i = 0; i < 60; ++i)
-    add_bump(anywhere(), anywhere(), random.uniform(4, 9), 0.25 * random.normal());  // hollows
-  for (int i = 0; i < 900; ++i) {                                                    // rocks
+  for (int i = 0; i < 60; ++i) {  // hollows
+    const double rise = 0.25 * random.normal(), radius = random.uniform(4, 9), y = anywhere(), x = anywhere();
+    add_bump(x, y, radius, rise);
+  }
+  for (int i = 0; i < 900; ++i) {  // rocks
     const double x = anywhere(), y = anywhere(), radius = random.uniform(0.3, 0.9);
     add_bump(x, y, radius, random.uniform(0.15, 0.6) * radius);
   }

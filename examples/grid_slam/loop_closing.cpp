@@ -134,8 +134,8 @@ std::vector<cairn::PathPose<SE2>> moved_by(std::vector<cairn::PathPose<SE2>> pat
   CAIRN_EXPECTS(!path.empty(), "moved_by needs a path");
   std::vector<Vector<3>> noise;
   for (const Loop& loop : loops) {
-    const Vector<3> v(random.normal(), random.normal(), random.normal());
-    noise.emplace_back(cairn::Cholesky<3>(loop.covariance).lower() * v);
+    const double turn = random.normal(), y = random.normal(), x = random.normal();
+    noise.emplace_back(cairn::Cholesky<3>(loop.covariance).lower() * Vector<3>(x, y, turn));
   }
   const std::vector<SE2> moved = conditioned(drawn_steps(path), loops, noise);
   for (std::size_t k = 0; k < moved.size(); ++k) {

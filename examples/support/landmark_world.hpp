@@ -179,12 +179,13 @@ inline std::vector<WorldStep> LandmarkWorld::drive(const std::vector<cairn::Vect
       const RangeAndBearing z = seen_from(pose, landmarks[i]);
       const double range = z.part<0>()(0);
       if (range > reach || random.uniform() > detection) continue;
-      see(range + random.normal(0, range_sigma), z.part<1>().angle() + random.normal(0, bearing_sigma),
-          static_cast<int>(i));
+      const double turned = random.normal(0, bearing_sigma), farther = random.normal(0, range_sigma);
+      see(range + farther, z.part<1>().angle() + turned, static_cast<int>(i));
     }
-    for (double left = false_alarms; random.uniform() < left; left -= 1)
-      see(reach * std::sqrt(random.uniform(0.02, 1)), random.uniform(-std::numbers::pi, std::numbers::pi),
-          nothing_real);
+    for (double left = false_alarms; random.uniform() < left; left -= 1) {
+      const double bearing = random.uniform(-std::numbers::pi, std::numbers::pi);
+      see(reach * std::sqrt(random.uniform(0.02, 1)), bearing, nothing_real);
+    }
     log.push_back(std::move(step));
   }
   return log;
