@@ -18,6 +18,7 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/factor.hpp>
 #include <cairn/filter/detail/symmetric_rows.hpp>
 #include <cairn/version.hpp>
 
@@ -287,48 +288,32 @@ public:
   /// the result's size and not of the prior's. As A P H^T - K R is zero but for rounding, these rows are
   /// A_nn P_n: less a small correction: O(n d^2).
   [[nodiscard]] bool stabilise(std::span<const JacobianPart<S>> parts, const S* lower, const S* r) {
-    const int d = named_count(), m = m_;
     if (!keeps_digits(false)) return false;
-    S* const gain = rows_of_zeros(index(m));
-    for (int j = m - 1; j >= 0; --j) {
-      add_scaled(row(gain, j), row(cross_, j), S(1), stride_);
-      for (int i = j + 1; i < m; ++i) add_scaled(row(gain, j), row(gain, i), -lower[j * m + i], stride_);
-      scale(row(gain, j), S(1) / lower[j * m + j]);
-    }
-    if (considered_count_ > 0) mask(gain, m);
-    S* const h = zeros(index(m) * index(d));   // H over the named rows, m x d
-    S* const hp = zeros(index(m) * index(d));  // H P of the named rows, m x d
-    for (std::size_t i = 0; i < parts.size(); ++i)
-      for (int k = 0; k < parts[i].block.count; ++k)
-        for (int a = 0; a < parts[i].rows; ++a)
-          h[(where_[i] + k) * m + parts[i].first + a] += parts[i].jacobian[k * parts[i].leading + a];
-    for (int b = 0; b < d; ++b)
-      for (int i = 0; i < m; ++i)
-        for (int k = 0; k <= i; ++k)
-          hp[b * m + i] += lower[k * m + i] * row(cross_, k)[named_rows_[index(b)]];
-    S* const a = zeros(index(d) * index(d));
-    S* const rest = zeros(index(d) * index(m));
+    const int d = named_count(), m = m_;
+    S* const gain = gain_rows(lower);
+    const View<S> h = jacobian_over_named(parts), hp = predicted_of_named(lower);
+    const View<S> a = small(d, d), rest = small(d, m);  // A_nn; A P H^T - K R of the named rows
     for (int q = 0; q < d; ++q)
       for (int p = 0; p < d; ++p) {
         S sum = S(p == q ? 1 : 0);
-        for (int i = 0; i < m; ++i) sum -= row(gain, i)[named_rows_[index(p)]] * h[q * m + i];
-        a[q * d + p] = sum;
+        for (int i = 0; i < m; ++i) sum -= named(gain, i, p) * h(i, q);
+        a(p, q) = sum;
       }
     for (int i = 0; i < m; ++i)
       for (int p = 0; p < d; ++p) {
         S sum(0);
-        for (int q = 0; q < d; ++q) sum += a[q * d + p] * hp[q * m + i];
-        for (int k = 0; k < m; ++k) sum -= row(gain, k)[named_rows_[index(p)]] * r[i * m + k];
-        rest[i * d + p] = sum;
+        for (int q = 0; q < d; ++q) sum += a(p, q) * hp(i, q);
+        for (int k = 0; k < m; ++k) sum -= named(gain, k, p) * r[i * m + k];
+        rest(p, i) = sum;
       }
     stabilised_ = rows_of_zeros(index(d));
     for (int p = 0; p < d; ++p) {
-      for (int q = 0; q < d; ++q) add_scaled(row(stabilised_, p), row(gathered_, q), a[q * d + p], stride_);
-      for (int i = 0; i < m; ++i) add_scaled(row(stabilised_, p), row(gain, i), -rest[i * d + p], stride_);
+      for (int q = 0; q < d; ++q) add_scaled(row(stabilised_, p), row(gathered_, q), a(p, q), stride_);
+      for (int i = 0; i < m; ++i) add_scaled(row(stabilised_, p), row(gain, i), -rest(p, i), stride_);
     }
     S* const corner = work_.take(index(d) * index(d));
     for (int q = 0; q < d; ++q)
-      for (int p = 0; p < d; ++p) corner[q * d + p] = row(stabilised_, p)[named_rows_[index(q)]];
+      for (int p = 0; p < d; ++p) corner[q * d + p] = named(stabilised_, p, q);
     mirror_mean(corner, d);
     put_corner(stabilised_, corner);
     return semi_definite(corner, d);
@@ -407,104 +392,40 @@ public:
   [[nodiscard]] bool learn(std::span<const RowRange> blocks, const S* step, const S* posterior, int added,
                            S& squared) {
     name(blocks);
-    const int d = named_count(), all = d + added;
+    const int d = named_count();
     stride_ = padded<S>(size() + added);
-    work_.open((4 * index(d) + index(added) + 1) * stride_ + scratch_for(all));
+    work_.open((4 * index(d) + index(added) + 1) * stride_ + scratch_for(d + added));
     gathered_ = gather(index(d));
-    order_.resize(index(d));
-    S* const root = work_.take(index(d) * index(d));
-    S* const diagonal = work_.take(index(d));
-    for (int q = 0; q < d; ++q)
-      for (int p = 0; p < d; ++p) root[q * d + p] = row(gathered_, p)[named_rows_[index(q)]];
-    if (!pivoted_cholesky(root, d, order_.data(), diagonal, m_)) return false;
-    const int rank = m_;
-    // y of step = root y, and what is left of the step
+    NamedRoot root;
+    if (!factor_named(root)) return false;
+    m_ = root.rank;
     S* const y = work_.take(index(d));
-    S* const left = work_.take(index(d));
-    std::copy_n(step, d, left);
-    squared = S(0);
-    for (int k = 0; k < rank; ++k) {
-      const S* const column = root + order_[index(k)] * d;
-      y[k] = left[order_[index(k)]] / column[order_[index(k)]];
-      squared += y[k] * y[k];
-      for (int q = k; q < d; ++q) left[order_[index(q)]] -= column[order_[index(q)]] * y[k];
-    }
-    for (int q = rank; q < d; ++q) {
-      const int i = order_[index(q)];
-      if (!(left[i] * left[i] <= no_variance<S> * diagonal[i] * (S(1) + squared))) return false;
-    }
-    // V = root^-1 P_s:, so that P_:s P_ss^-1 P_s: = V^T V
-    cross_ = rows_of_zeros(index(rank));
-    for (int k = 0; k < rank; ++k) {
-      const int p = order_[index(k)];
-      add_scaled(row(cross_, k), row(gathered_, p), S(1), stride_);
-      for (int l = 0; l < k; ++l)
-        add_scaled(row(cross_, k), row(cross_, l), -root[order_[index(l)] * d + p], stride_);
-      scale(row(cross_, k), S(1) / root[p * d + p]);
-    }
+    if (!whiten_step(root, step, y, squared)) return false;
+    whiten_gathered(root);
     step_ = rows_of_zeros(1);
-    for (int k = 0; k < rank; ++k) add_scaled(step_, row(cross_, k), y[k], stride_);
-    // Covariance of y with the named and the new numbers, then of y itself
-    S* const with = zeros(index(rank) * index(all));
-    S* const own = zeros(index(rank) * index(rank));
-    if (posterior != nullptr) {
-      for (int j = 0; j < all; ++j)
-        for (int k = 0; k < rank; ++k) {
-          const int p = order_[index(k)];
-          S sum = posterior[j * all + p];
-          for (int l = 0; l < k; ++l) sum -= root[order_[index(l)] * d + p] * with[j * rank + l];
-          with[j * rank + k] = sum / root[p * d + p];
-        }
-      for (int j = 0; j < rank; ++j)
-        for (int k = 0; k < rank; ++k) {
-          const int p = order_[index(k)];
-          S sum = with[p * rank + j];
-          for (int l = 0; l < k; ++l) sum -= root[order_[index(l)] * d + p] * own[l * rank + j];
-          own[k * rank + j] = sum / root[p * d + p];
-        }
-    }
-    less_ = rows_of_zeros(index(rank));  // (I - own) V
-    for (int k = 0; k < rank; ++k)
-      for (int l = 0; l < rank; ++l)
-        add_scaled(row(less_, k), row(cross_, l), S(k == l ? 1 : 0) - own[l * rank + k], stride_);
+    for (int k = 0; k < m_; ++k) add_scaled(step_, row(cross_, k), y[k], stride_);
+
+    const View<S> with = small(m_, d + added), own = small(m_, m_);
+    if (posterior != nullptr) whiten_posterior(root, posterior, with, own);
+    less_ = rows_of_zeros(index(m_));  // (I - own) V
+    for (int k = 0; k < m_; ++k)
+      for (int l = 0; l < m_; ++l)
+        add_scaled(row(less_, k), row(cross_, l), S(k == l ? 1 : 0) - own(k, l), stride_);
     // The named rows take the place of what was read of them.
     stabilised_ = gathered_;
     std::fill_n(stabilised_, index(d) * stride_, S(0));
-    for (int p = 0; p < d; ++p)
-      for (int k = 0; k < rank; ++k)
-        add_scaled(row(stabilised_, p), row(cross_, k), with[p * rank + k], stride_);
     added_ = rows_of_zeros(index(added));
-    for (int i = 0; i < added; ++i)
-      for (int k = 0; k < rank; ++k)
-        add_scaled(row(added_, i), row(cross_, k), with[(d + i) * rank + k], stride_);
-    corner_ = zeros(index(added) * index(added));
-    for (int q = 0; q < d; ++q) {
-      for (int p = 0; p < d; ++p)
-        row(stabilised_, p)[named_rows_[index(q)]] = posterior == nullptr ? S(0) : posterior[q * all + p];
-      for (int i = 0; i < added; ++i) row(added_, i)[named_rows_[index(q)]] = posterior[q * all + d + i];
-      step_[named_rows_[index(q)]] = step[q];
+    for (int k = 0; k < m_; ++k) {
+      for (int p = 0; p < d; ++p) add_scaled(row(stabilised_, p), row(cross_, k), with(k, p), stride_);
+      for (int i = 0; i < added; ++i) add_scaled(row(added_, i), row(cross_, k), with(k, d + i), stride_);
     }
-    for (int j = 0; j < added; ++j)
-      for (int i = 0; i < added; ++i) corner_[j * added + i] = posterior[(d + j) * all + d + i];
+    put_learned(step, posterior, added);
     make_room(size() + added);
-    bool good = finite_rows(stabilised_, d) && finite_rows(step_, 1) && finite_rows(added_, added);
+    const bool finite = finite_rows(stabilised_, d) && finite_rows(step_, 1) && finite_rows(added_, added);
     // Considered rows other than the named ones stay.
     for (int i = 0; i < size() && considered_count_ > 0; ++i)
       if (considered_[index(i)] != 0 && !is_named(i)) step_[i] = S(0);
-    certain_.clear();
-    for (int i = 0; i < size(); ++i) {
-      if (considered_[index(i)] != 0) continue;
-      const S prior = p_.at(i, i);
-      S lowered = prior;
-      for (int k = 0; k < rank; ++k) lowered -= row(less_, k)[i] * row(cross_, k)[i];
-      good = good && lowered - lowered == S(0);
-      if (!(lowered > no_variance<S> * prior) && !is_named(i)) certain_.push_back(i);
-    }
-    for (const int i : certain_) {
-      for (int p = 0; p < d; ++p) row(stabilised_, p)[i] = S(0);
-      for (int k = 0; k < added; ++k) row(added_, k)[i] = S(0);
-    }
-    return good;
+    return find_certain(added) && finite;
   }
   /// Keeps what was learned; rows whose variance is nothing but rounding get none. New numbers are to be
   /// written by write_extension() afterwards.
@@ -534,6 +455,142 @@ private:
     return piece;
   }
   [[nodiscard]] S* rows_of_zeros(std::size_t count) { return zeros(count * stride_); }
+
+  [[nodiscard]] View<S> small(int rows, int cols) { return {zeros(index(rows) * index(cols)), rows, cols}; }
+  /// What row i of whole rows has in the column of named row p.
+  [[nodiscard]] S& named(S* rows, int i, int p) const { return row(rows, i)[named_rows_[index(p)]]; }
+
+  // Of stabilise().
+
+  /// K^T = L^-T W, a row for each number of the measurement.
+  [[nodiscard]] S* gain_rows(const S* lower) {
+    S* const gain = rows_of_zeros(index(m_));
+    for (int j = m_ - 1; j >= 0; --j) {
+      add_scaled(row(gain, j), row(cross_, j), S(1), stride_);
+      for (int i = j + 1; i < m_; ++i) add_scaled(row(gain, j), row(gain, i), -lower[j * m_ + i], stride_);
+      scale(row(gain, j), S(1) / lower[j * m_ + j]);
+    }
+    if (considered_count_ > 0) mask(gain, m_);
+    return gain;
+  }
+  /// H, a column for each named row.
+  [[nodiscard]] View<S> jacobian_over_named(std::span<const JacobianPart<S>> parts) {
+    const View<S> h = small(m_, named_count());
+    for (std::size_t i = 0; i < parts.size(); ++i)
+      for (int k = 0; k < parts[i].block.count; ++k)
+        for (int a = 0; a < parts[i].rows; ++a)
+          h(parts[i].first + a, where_[i] + k) += parts[i].jacobian[k * parts[i].leading + a];
+    return h;
+  }
+  /// H P = L W in the columns of the named rows.
+  [[nodiscard]] View<S> predicted_of_named(const S* lower) {
+    const View<S> hp = small(m_, named_count());
+    for (int q = 0; q < hp.cols(); ++q)
+      for (int i = 0; i < m_; ++i)
+        for (int k = 0; k <= i; ++k) hp(i, q) += lower[k * m_ + i] * named(cross_, k, q);
+    return hp;
+  }
+
+  // Of learn().
+
+  /// P_ss = L L^T along its largest pivots, as pivoted_cholesky() leaves it: (p, k) is L of named row p and
+  /// pivot k, for rows that are pivots from k on.
+  struct NamedRoot {
+    const S* numbers = nullptr;
+    const S* diagonal = nullptr;  // of P_ss
+    const int* pivots = nullptr;  // the named row of each pivot, then those without one
+    int d = 0;
+    int rank = 0;
+
+    [[nodiscard]] int pivot(int k) const { return pivots[index(k)]; }
+    S operator()(int p, int k) const { return numbers[pivot(k) * d + p]; }
+  };
+  [[nodiscard]] bool factor_named(NamedRoot& root) {
+    const int d = named_count();
+    order_.resize(index(d));
+    S* const numbers = work_.take(index(d) * index(d));
+    S* const diagonal = work_.take(index(d));
+    for (int q = 0; q < d; ++q)
+      for (int p = 0; p < d; ++p) numbers[q * d + p] = named(gathered_, p, q);
+    root = {numbers, diagonal, order_.data(), d, 0};
+    return pivoted_cholesky(numbers, d, order_.data(), diagonal, root.rank);
+  }
+  /// y of step = L y, and |y|^2. False where the step leaves the range of L.
+  [[nodiscard]] bool whiten_step(const NamedRoot& root, const S* step, S* y, S& squared) {
+    S* const left = work_.take(index(root.d));
+    std::copy_n(step, root.d, left);
+    squared = S(0);
+    for (int k = 0; k < root.rank; ++k) {
+      y[k] = left[root.pivot(k)] / root(root.pivot(k), k);
+      squared += y[k] * y[k];
+      for (int q = k; q < root.d; ++q) left[root.pivot(q)] -= root(root.pivot(q), k) * y[k];
+    }
+    for (int q = root.rank; q < root.d; ++q) {
+      const int i = root.pivot(q);
+      if (!(left[i] * left[i] <= no_variance<S> * root.diagonal[i] * (S(1) + squared))) return false;
+    }
+    return true;
+  }
+  /// cross_: V = L^-1 P_s:, so that P_:s P_ss^-1 P_s: = V^T V.
+  void whiten_gathered(const NamedRoot& root) {
+    cross_ = rows_of_zeros(index(root.rank));
+    for (int k = 0; k < root.rank; ++k) {
+      const int p = root.pivot(k);
+      add_scaled(row(cross_, k), row(gathered_, p), S(1), stride_);
+      for (int l = 0; l < k; ++l) add_scaled(row(cross_, k), row(cross_, l), -root(p, l), stride_);
+      scale(row(cross_, k), S(1) / root(p, k));
+    }
+  }
+  /// The covariance of y, after what was learned, with the named and the new numbers, and its own.
+  static void whiten_posterior(const NamedRoot& root, const S* posterior, const View<S>& with,
+                               const View<S>& own) {
+    for (int j = 0; j < with.cols(); ++j)
+      for (int k = 0; k < root.rank; ++k) {
+        const int p = root.pivot(k);
+        S sum = posterior[j * with.cols() + p];
+        for (int l = 0; l < k; ++l) sum -= root(p, l) * with(l, j);
+        with(k, j) = sum / root(p, k);
+      }
+    for (int j = 0; j < root.rank; ++j)
+      for (int k = 0; k < root.rank; ++k) {
+        const int p = root.pivot(k);
+        S sum = with(j, p);
+        for (int l = 0; l < k; ++l) sum -= root(p, l) * own(j, l);
+        own(j, k) = sum / root(p, k);
+      }
+  }
+  /// What is known of the named and the new numbers among one another is what was given, to the last bit.
+  void put_learned(const S* step, const S* posterior, int added) {
+    const int d = named_count(), all = d + added;
+    corner_ = zeros(index(added) * index(added));
+    for (int q = 0; q < d; ++q) {
+      for (int p = 0; p < d; ++p)
+        named(stabilised_, p, q) = posterior == nullptr ? S(0) : posterior[q * all + p];
+      for (int i = 0; i < added; ++i) named(added_, i, q) = posterior[q * all + d + i];
+      step_[named_rows_[index(q)]] = step[q];
+    }
+    for (int j = 0; j < added; ++j)
+      for (int i = 0; i < added; ++i) corner_[j * added + i] = posterior[(d + j) * all + d + i];
+  }
+  /// certain_: rows whose variance becomes nothing but rounding, which then vary with nothing. False where a
+  /// variance is not finite.
+  [[nodiscard]] bool find_certain(int added) {
+    bool good = true;
+    certain_.clear();
+    for (int i = 0; i < size(); ++i) {
+      if (considered_[index(i)] != 0) continue;
+      const S prior = p_.at(i, i);
+      S lowered = prior;
+      for (int k = 0; k < m_; ++k) lowered -= row(less_, k)[i] * row(cross_, k)[i];
+      good = good && lowered - lowered == S(0);
+      if (!(lowered > no_variance<S> * prior) && !is_named(i)) certain_.push_back(i);
+    }
+    for (const int i : certain_) {
+      for (int p = 0; p < named_count(); ++p) row(stabilised_, p)[i] = S(0);
+      for (int k = 0; k < added; ++k) row(added_, k)[i] = S(0);
+    }
+    return good;
+  }
 
   /// Lists the distinct ranges, in rising order, and says which named row each part begins with.
   void name(std::span<const JacobianPart<S>> parts) {
