@@ -34,6 +34,118 @@ inline constexpr int common_rows = ShapeOf<D>::rows != dynamic ? ShapeOf<D>::row
                                    : ShapeOf<C>::rows == 1     ? ShapeOf<C>::columns
                                                                : ShapeOf<C>::rows;
 
+/// Constraints on the u of a step L u: a column of numbers each, of length 1 where nothing cancels, and what
+/// its product with u has to be.
+template <int N, int K, class S>
+class ScaledConstraints {
+public:
+  /// D (L u) = c, each row divided by what its terms deviate by; `sigma` are the deviations of L u. False for
+  /// a constraint that wants another value of what cannot vary.
+  [[nodiscard]] bool fill(const Matrix<K, N, S>& d, const Vector<K, S>& c, const Matrix<N, N, S>& root,
+                          const Vector<N, S>& sigma) {
+    using std::abs;
+    const int n = static_cast<int>(root.rows()), k = static_cast<int>(d.rows());
+    columns_ = transposed<K, N, S>(column_product(d, root));
+    wanted_ = c;
+    waits_ = Vector<K, S>::Ones(k);
+    path_ = Vector<N, S>::Zero(n);
+    for (int j = 0; j < k; ++j) {
+      S size(0);
+      for (int i = 0; i < n; ++i) size += abs(d(j, i)) * sigma(i);
+      if (!(size > S(0))) {
+        if (wanted_(j) != S(0)) return false;
+        waits_(j) = S(0);
+        continue;
+      }
+      for (int i = 0; i < n; ++i) columns_(i, j) /= size;
+      wanted_(j) /= size;
+    }
+    return true;
+  }
+
+  /// Reflects the longest column that waits onto the next axis of u, until what is left of them is rounding;
+  /// path() is R^-T c by rows as it arises, and `left` becomes L times the reflections. False where a column
+  /// is left that is neither rounding nor has three digits.
+  [[nodiscard]] bool reflect(Matrix<N, N, S>& left) {
+    const int n = static_cast<int>(columns_.rows()), k = static_cast<int>(columns_.cols());
+    for (; rank_ < n && rank_ < k; ++rank_) {
+      S most(0);
+      const int best = longest(most);
+      // Rounding of P itself hides deviations below the root of its own.
+      if (best < 0 || !(most > rounding_share<S>)) break;
+      if (!(most > digits_left<S>)) return false;
+      waits_(best) = S(0);
+      reflect_onto_axis(best, most, left);
+      S sum = wanted_(best);
+      for (int i = 0; i < rank_; ++i) sum -= columns_(i, best) * path_(i);
+      path_(rank_) = sum / columns_(rank_, best);
+    }
+    return true;
+  }
+
+  /// What still waits follows from what was taken.
+  [[nodiscard]] bool agree() const {
+    using std::abs;
+    using std::sqrt;
+    S size(0);
+    for (int i = 0; i < rank_; ++i) size += path_(i) * path_(i);
+    for (int j = 0; j < static_cast<int>(columns_.cols()); ++j) {
+      if (!(waits_(j) > S(0))) continue;
+      S gap = wanted_(j);
+      for (int i = 0; i < rank_; ++i) gap -= columns_(i, j) * path_(i);
+      if (!(abs(gap) <= sqrt(rounding_share<S>) * (S(1) + sqrt(size)))) return false;
+    }
+    return true;
+  }
+
+  [[nodiscard]] int rank() const noexcept { return rank_; }
+  /// The shortest u, along the reflected axes 0 ... rank() - 1.
+  [[nodiscard]] const Vector<N, S>& path() const noexcept { return path_; }
+
+private:
+  /// The column that waits of which most is left; -1 where none is.
+  [[nodiscard]] int longest(S& most) const {
+    int best = -1;
+    for (int j = 0; j < static_cast<int>(columns_.cols()); ++j) {
+      S squares(0);
+      for (int i = rank_; i < static_cast<int>(columns_.rows()); ++i)
+        squares += columns_(i, j) * columns_(i, j);
+      if (waits_(j) > S(0) && squares > most) {
+        most = squares;
+        best = j;
+      }
+    }
+    return best;
+  }
+
+  /// Householder's reflection of column `pivot`, whose squares from row rank_ on sum up to `squares`.
+  void reflect_onto_axis(int pivot, S squares, Matrix<N, N, S>& left) {
+    using std::abs;
+    using std::sqrt;
+    const int n = static_cast<int>(columns_.rows());
+    const S norm = sqrt(squares);
+    const S first = columns_(rank_, pivot) + (columns_(rank_, pivot) < S(0) ? -norm : norm);
+    Vector<N, S> mirror = Vector<N, S>::Zero(n);
+    mirror(rank_) = first;
+    for (int i = rank_ + 1; i < n; ++i) mirror(i) = columns_(i, pivot);
+    const S scale = S(1) / (norm * abs(first));  // 2 / |mirror|^2
+    const auto reflect_entries = [&](auto&& entry) {
+      S dot(0);
+      for (int i = rank_; i < n; ++i) dot += mirror(i) * entry(i);
+      dot *= scale;
+      for (int i = rank_; i < n; ++i) entry(i) -= dot * mirror(i);
+    };
+    for (int j = 0; j < static_cast<int>(columns_.cols()); ++j)
+      reflect_entries([&](int i) -> S& { return columns_(i, j); });
+    for (int i = 0; i < n; ++i) reflect_entries([&](int k) -> S& { return left(i, k); });
+  }
+
+  Matrix<N, K, S> columns_;
+  Vector<K, S> wanted_, waits_;  // 1 where a constraint has not been taken, nor is empty
+  Vector<N, S> path_;
+  int rank_ = 0;
+};
+
 }  // namespace detail
 
 /// Projects the belief onto the K constraints; for vectors D x = b is c = b - D mean. A constraint that
@@ -45,13 +157,11 @@ template <Manifold X, int K>
 Status constrain(Gaussian<X>& belief, const Matrix<K, dof<X>, ScalarOf<X>>& d,
                  const Vector<K, ScalarOf<X>>& c) {
   using S = ScalarOf<X>;
-  using std::abs;
   using std::sqrt;
   constexpr int n = dof<X>;
-  constexpr S digits = detail::digits_left<S>;
   if (!detail::has_size(d, c.size(), detail::common_size(belief.mean, belief.covariance)) || c.size() == 0)
     return Status::size_mismatch;
-  const int ns = static_cast<int>(belief.covariance.rows()), ks = static_cast<int>(d.rows());
+  const int ns = static_cast<int>(belief.covariance.rows());
   if (!all_finite(d) || !all_finite(c) || !all_finite(belief.covariance)) return Status::not_finite;
   CovarianceOf<X> root = belief.covariance;
   if (!detail::checked_root<n, S>(belief.covariance, root)) return Status::not_positive_definite;
@@ -61,77 +171,22 @@ Status constrain(Gaussian<X>& belief, const Matrix<K, dof<X>, ScalarOf<X>>& d,
     for (int k = 0; k <= i; ++k) variance += root(i, k) * root(i, k);
     sigma(i) = sqrt(variance);
   }
-  // A column for each constraint, in units of its terms' deviations: length 1 where nothing cancels.
-  Matrix<n, K, S> a = transposed<K, n, S>(detail::column_product(d, root));
-  Vector<K, S> wanted = c;
-  Vector<K, S> waits = Vector<K, S>::Ones(ks);
-  for (int j = 0; j < ks; ++j) {
-    S size(0);
-    for (int i = 0; i < ns; ++i) size += abs(d(j, i)) * sigma(i);
-    if (size > S(0)) {
-      for (int i = 0; i < ns; ++i) a(i, j) /= size;
-      wanted(j) /= size;
-    } else if (wanted(j) != S(0)) {
-      return Status::contradiction;  // of what cannot vary
-    } else {
-      waits(j) = S(0);
-    }
-  }
-  // Each pivot column is reflected onto one axis of u; `path` is R^-T c by rows as it arises.
-  CovarianceOf<X> left = root;  // L times the reflections so far
-  Vector<n, S> path = Vector<n, S>::Zero(ns);
-  int rank = 0;
-  for (; rank < ns && rank < ks; ++rank) {
-    int best = -1;
-    S most(0);
-    for (int j = 0; j < ks; ++j) {
-      S squares(0);
-      for (int i = rank; i < ns; ++i) squares += a(i, j) * a(i, j);
-      if (waits(j) > S(0) && squares > most) {
-        most = squares;
-        best = j;
-      }
-    }
-    // Rounding of P itself hides deviations below the root of its own.
-    if (best < 0 || !(most > detail::rounding_share<S>)) break;
-    if (!(most > digits)) return Status::not_positive_definite;
-    waits(best) = S(0);
-    const S norm = sqrt(most);
-    const S first = a(rank, best) + (a(rank, best) < S(0) ? -norm : norm);
-    Vector<n, S> mirror = Vector<n, S>::Zero(ns);
-    mirror(rank) = first;
-    for (int i = rank + 1; i < ns; ++i) mirror(i) = a(i, best);
-    const S scale = S(1) / (norm * abs(first));  // 2 / |mirror|^2
-    const auto reflect = [&](auto&& entry) {
-      S dot(0);
-      for (int i = rank; i < ns; ++i) dot += mirror(i) * entry(i);
-      dot *= scale;
-      for (int i = rank; i < ns; ++i) entry(i) -= dot * mirror(i);
-    };
-    for (int j = 0; j < ks; ++j) reflect([&](int i) -> S& { return a(i, j); });
-    for (int i = 0; i < ns; ++i) reflect([&](int k) -> S& { return left(i, k); });
-    S sum = wanted(best);
-    for (int i = 0; i < rank; ++i) sum -= a(i, best) * path(i);
-    path(rank) = sum / a(rank, best);
-  }
-  S size(0);
-  for (int i = 0; i < rank; ++i) size += path(i) * path(i);
-  for (int j = 0; j < ks; ++j) {  // what is left must follow from what was taken
-    if (!(waits(j) > S(0))) continue;
-    S gap = wanted(j);
-    for (int i = 0; i < rank; ++i) gap -= a(i, j) * path(i);
-    if (!(abs(gap) <= sqrt(detail::rounding_share<S>) * (S(1) + sqrt(size)))) return Status::contradiction;
-  }
+  detail::ScaledConstraints<n, K, S> constraints;
+  if (!constraints.fill(d, c, root, sigma)) return Status::contradiction;
+  CovarianceOf<X> free = root;
+  if (!constraints.reflect(free)) return Status::not_positive_definite;
+  if (!constraints.agree()) return Status::contradiction;
   Tangent<X> step = Tangent<X>::Zero(ns);
-  CovarianceOf<X> free = left;
   for (int i = 0; i < ns; ++i) {
     S squares(0);
     for (int k = 0; k < ns; ++k) {
-      if (k < rank) step(i) += left(i, k) * path(k);
-      if (k < rank) free(i, k) = S(0);
+      if (k < constraints.rank()) {
+        step(i) += free(i, k) * constraints.path()(k);
+        free(i, k) = S(0);
+      }
       squares += free(i, k) * free(i, k);
     }
-    if (sqrt(squares) > digits * sigma(i)) continue;
+    if (sqrt(squares) > detail::digits_left<S> * sigma(i)) continue;
     for (int k = 0; k < ns; ++k) free(i, k) = S(0);  // rounding: known exactly now
   }
   if (!all_finite(step)) return Status::not_positive_definite;

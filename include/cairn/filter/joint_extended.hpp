@@ -158,6 +158,9 @@ private:
   template <int M, class S>
   [[nodiscard]] bool lowers(detail::JointCovariance<S>& core, std::span<const detail::JacobianPart<S>> parts,
                             const Cholesky<M, S>& root, const Matrix<M, M, S>& r) const;
+  template <LinearisedMeasurement H, class... Kinds, class... X>
+  [[nodiscard]] Status iterated(JointGaussian<Kinds...>& belief, const H& sensor, const typename H::State& x,
+                                const typename H::Measurement& z, BlockId<X>... ids) const;
 };
 
 /// The inverse model of a sensor whose State is Product<Known..., New> and whose initialise(x, z) says where
@@ -486,7 +489,6 @@ Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> JointExten
   using State = typename H::State;
   using S = ScalarOf<State>;
   constexpr int m = dof<typename H::Measurement>;
-  constexpr int n = dof<State>;
   Innovation<m, S> in;
   if (!(belief.has(ids) && ...)) {
     in.status = Status::unknown_block;
@@ -508,22 +510,30 @@ Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> JointExten
   core.measure(parts, rows, in.covariance.data());
   in.covariance += at.noise;
   Vector<m, S> y = at.residual;
-  {
-    const Cholesky<m, S> root(in.covariance);
-    in.status = verdict<m, S>(in, root, y);
-    if (!in.accepted()) return in;
-    if (iterations == 1) [[likely]] {
-      if (!lowers<m, S>(core, parts, root, at.noise)) {
-        in.status = Status::not_positive_definite;
-        return in;
-      }
-      core.step_by_whitened(y.data());
-      core.lower();
-      belief.move(core.step());
+  const Cholesky<m, S> root(in.covariance);
+  in.status = verdict<m, S>(in, root, y);
+  if (!in.accepted()) return in;
+  if (iterations == 1) [[likely]] {
+    if (!lowers<m, S>(core, parts, root, at.noise)) {
+      in.status = Status::not_positive_definite;
       return in;
     }
+    core.step_by_whitened(y.data());
+    core.lower();
+    belief.move(core.step());
+    return in;
   }
-  // The same with the last linearisation of the named blocks' own iteration.
+  in.status = iterated(belief, sensor, x, z, ids...);
+  return in;
+}
+
+/// update() with the last linearisation of the named blocks' own iteration, the first having passed the gate.
+template <LinearisedMeasurement H, class... Kinds, class... X>
+Status JointExtended::iterated(JointGaussian<Kinds...>& belief, const H& sensor, const typename H::State& x,
+                               const typename H::Measurement& z, BlockId<X>... ids) const {
+  using State = typename H::State;
+  using S = ScalarOf<State>;
+  constexpr int n = dof<State>;
   struct Context {
     const H& sensor;
     const typename H::Measurement& z;
@@ -547,22 +557,20 @@ Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> JointExten
   Vector<dynamic, S> dual;
   const std::array<detail::RowRange, sizeof...(X)> ranges{belief.range(*belief.find(ids))...};
   Matrix<dynamic, dynamic, S> p(n, n);
+  detail::JointCovariance<S>& core = belief.core_;
   core.read(ranges, ranges, p.data());
-  in.status = detail::iterate<S>(mode, p, iterations, tolerance, dual);
-  if (!in.accepted()) return in;
+  const Status found = detail::iterate<S>(mode, p, iterations, tolerance, dual);
+  if (found != Status::accepted) return found;
   Matrix<dynamic, dynamic, S> covariance = mode.noise;
   const auto last = belief.template parts<dynamic, X...>(mode.jacobian, ids...);
-  core.measure(last, rows, covariance.data());
+  core.measure(last, static_cast<int>(mode.residual.size()), covariance.data());
   covariance += mode.noise;
   const Cholesky<dynamic, S> root(covariance);
-  if (!root.good() || !lowers<dynamic, S>(core, last, root, mode.noise)) {
-    in.status = Status::not_positive_definite;
-    return in;
-  }
+  if (!root.good() || !lowers<dynamic, S>(core, last, root, mode.noise)) return Status::not_positive_definite;
   core.step_by_dual(last, dual.data());
   core.lower();
   belief.move_and_carry(core.step());
-  return in;
+  return Status::accepted;
 }
 
 template <class... Kinds>
