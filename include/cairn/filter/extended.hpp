@@ -88,6 +88,42 @@ template <Manifold X>
   return numeric_jacobian([&](const Tangent<X>& d) -> X { return retract(prior, d); }, e);
 }
 
+/// The longest of the steps `moved`, made at `e`, in standard deviations after the update; less what rounding
+/// alone moves. Roots of the covariances before and after.
+template <int N, class S>
+[[nodiscard]] S deviations_moved(const Vector<N, S>& moved, const Vector<N, S>& e,
+                                 const Matrix<N, N, S>& root, const Matrix<N, N, S>& updated) {
+  using std::abs;
+  using std::sqrt;
+  const int n = static_cast<int>(moved.size());
+  S size(0);
+  for (int i = 0; i < n; ++i) {
+    S after(0), before(0);
+    for (int j = 0; j < n; ++j) {
+      after += updated(i, j) * updated(i, j);
+      before += root(i, j) * root(i, j);
+    }
+    const S rounding = S(64) * std::numeric_limits<S>::epsilon() * (sqrt(before) + abs(e(i)));
+    const S beyond = abs(moved(i)) - rounding;
+    if (beyond > S(0) && !(beyond <= size * sqrt(after))) size = beyond / sqrt(after);
+  }
+  return size;
+}
+
+/// What the iteration lowers: |u|^2 + |W^-1 r|^2, W the lower root of the noise's covariance.
+template <int N, int M, class S>
+[[nodiscard]] S cost_of(const Vector<N, S>& u, const Vector<M, S>& r, const Matrix<M, M, S>& white) {
+  S sum(0);
+  for (int i = 0; i < static_cast<int>(u.size()); ++i) sum += u(i) * u(i);
+  Vector<M, S> y = r;
+  for (int i = 0; i < static_cast<int>(r.size()); ++i) {
+    for (int j = 0; j < i; ++j) y(i) -= white(i, j) * y(j);
+    y(i) /= white(i, i);
+    sum += y(i) * y(i);
+  }
+  return sum;
+}
+
 }  // namespace detail
 
 template <class H, class V>
@@ -95,8 +131,6 @@ Status Extended::iterate(Gaussian<typename H::State>& belief, const detail::Plai
   using X = typename H::State;
   using Z = typename H::Measurement;
   using S = ScalarOf<X>;
-  using std::abs;
-  using std::sqrt;
   constexpr int n = dof<X>;
   constexpr int m = dof<Z>;
   CovarianceOf<X> root = belief.covariance;
@@ -129,44 +163,24 @@ Status Extended::iterate(Gaussian<typename H::State>& belief, const detail::Plai
     if (!update.regular || !all_finite(update.step)) return Status::not_positive_definite;
     updated = detail::column_product(root, update.root);
     update.white = detail::column_product(root, update.white);
-    std::swap(update.root, updated);
+    std::swap(update.root, updated);  // determined() looks at the roots of the result
     if (!detail::determined<n, m, S, detail::Wanted::rarely>(update, root, h, noise,
                                                              detail::KeptAs::covariance))
       return Status::not_positive_definite;
     std::swap(update.root, updated);
     Tangent<X> change = update.step - u;
     const Tangent<X> moved = detail::column_product(root, change);
-    size = S(0);
-    for (int i = 0; i < ns; ++i) {
-      S after(0), before(0);
-      for (int j = 0; j < ns; ++j) {
-        after += updated(i, j) * updated(i, j);
-        before += root(i, j) * root(i, j);
-      }
-      const S rounding = S(64) * std::numeric_limits<S>::epsilon() * (sqrt(before) + abs(e(i)));
-      const S beyond = abs(moved(i)) - rounding;
-      if (beyond > S(0) && !(beyond <= size * sqrt(after))) size = beyond / sqrt(after);
-    }
+    size = detail::deviations_moved<n, S>(moved, e, root, updated);
     done = size <= static_cast<S>(tolerance);
-    const auto cost = [&](const Tangent<X>& at, const Vector<m, S>& r) {
-      S sum(0);
-      for (int i = 0; i < ns; ++i) sum += at(i) * at(i);
-      Vector<m, S> y = r;
-      for (int i = 0; i < ms; ++i) {
-        for (int j = 0; j < i; ++j) y(i) -= white_r(i, j) * y(j);
-        y(i) /= white_r(i, i);
-        sum += y(i) * y(i);
-      }
-      return sum;
-    };
-    const S now = has_cost ? cost(u, residual) : S(0);
+    const S now = has_cost ? detail::cost_of<n, m, S>(u, residual, white_r) : S(0);
     const S enough = now + S(16) * std::numeric_limits<S>::epsilon() * now;
     bool lower = false;
     for (int halving = 0; halving < 40 && !lower; ++halving) {
       const Tangent<X> next = u + change;
       const Tangent<X> next_e = detail::column_product(root, next);
       const Vector<m, S> next_residual = sensor.residual(retract(belief.mean, next_e));
-      lower = done || (has_cost ? cost(next, next_residual) <= enough : all_finite(next_residual));
+      lower = done || (has_cost ? detail::cost_of<n, m, S>(next, next_residual, white_r) <= enough
+                                : all_finite(next_residual));
       if (lower) {
         u = next;
         e = next_e;
