@@ -87,6 +87,7 @@ private:
     const std::uint32_t from = vertex(), landmark = vertex();
     if (from != *newest_) lines_.fail("a sighting from the newest pose");
     const double x = number(), y = number(), xx = number(), xy = number(), yy = number();
+    if (!(std::hypot(x, y) > 0)) lines_.fail("a landmark apart from the robot, which has a bearing");
     if (!(xx > 0) || xy != 0 || xx != yy) lines_.fail("a covariance that is the same in every direction");
     const double sigma = std::sqrt(xx);
     if (log_.sensor.across_sigma != 0 && log_.sensor.across_sigma != sigma)

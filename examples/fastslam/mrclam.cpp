@@ -27,7 +27,7 @@ constexpr std::size_t most_columns = 5;
 using Row = std::vector<double>;
 
 /// What a file's first columns are: times that do not fall, the numbers of subjects or bar codes (whole,
-/// below 2^24), any other numbers, or distances, which are not negative.
+/// below 2^24), any other numbers, or distances, which are above zero.
 enum class Column { time, identity, number, distance };
 
 /// Rows of the first numbers of each line.
@@ -44,7 +44,7 @@ std::vector<Row> read_rows(const std::filesystem::path& path, std::initializer_l
       if (kind == Column::time && !rows.empty() && n < rows.back()[i]) lines.fail("times that do not fall");
       if (kind == Column::identity && !(n >= 0 && n < Map::most_identity && n == std::floor(n)))
         lines.fail("a whole number from 0 to below 2^24 in column " + std::to_string(i + 1));
-      if (kind == Column::distance && n < 0) lines.fail("a distance that is not negative");
+      if (kind == Column::distance && !(n > 0)) lines.fail("a distance above zero");
     }
     rows.emplace_back(numbers, numbers + columns.size());
   }
@@ -182,16 +182,19 @@ LandmarkLog read_mrclam(const std::filesystem::path& folder, int robot) {
   for (Row& r : files.odometry) r[0] += delay;
   LandmarkLog log{
       .name = "UTIAS " + folder.filename().string() + ", robot " + std::to_string(robot),
-      .sensor =
-          {.range_sigma = 0.5, .bearing_sigma = 0.05, .farthest = 8, .half_view = 0.5, .detection = 0.25},
+      // A bar code faces one way, and what the camera does not read says nothing.
+      .sensor = {.range_sigma = 0.5, .bearing_sigma = 0.05, .farthest = 8, .half_view = 0.5, .detection = 0},
       .landmarks = files.landmarks,
   };
   for (const Row& r : files.truth) log.truth.push_back({r[0], {r[1], r[2], r[3]}});
   for (const auto& [time, pose] : log.truth)  // where it was when odometry began
     if (!log.start || time <= files.odometry.front()[0]) log.start = pose;
   std::set<int> unknown;
-  Wheels wheels(log, folder / (name + "_Odometry.dat"), files.odometry.front()[0]);
+  const double begin = files.odometry.front()[0];
+  Wheels wheels(log, folder / (name + "_Odometry.dat"), begin);
   std::size_t next = 0;
+  while (next < files.sightings.size() && files.sightings[next][0] <= begin) ++next;
+  std::size_t outside = next;
   for (const Row& o : files.odometry) {
     for (; next < files.sightings.size() && files.sightings[next][0] <= o[0]; ++next) {
       const Row& seen = files.sightings[next];
@@ -207,7 +210,12 @@ LandmarkLog read_mrclam(const std::filesystem::path& folder, int robot) {
     wheels.between();
     wheels.steer(o[1], o[2]);
   }
-  if (log.frames.empty()) cairn::raise(folder.string() + ": " + name + " saw no landmark of this set");
+  outside += files.sightings.size() - next;
+  if (log.frames.empty())
+    cairn::raise(folder.string() + ": " + name + " saw no landmark of this set while odometry was kept");
+  if (outside > 0)
+    log.notes.push_back("sightings before odometry begins or after it ends, left out: " +
+                        std::to_string(outside));
   for (const int code : unknown)
     log.notes.push_back("bar code " + std::to_string(code) + " belongs to nothing of the set: left out");
   if (delay != 0)

@@ -48,7 +48,7 @@ std::vector<Vector<2>> read_points(cairn::TextLines& lines, const char* name) {
   const auto columns = cairn::parse_number<int>(rest.substr(0, blank));
   const auto count = cairn::parse_number<std::size_t>(cairn::trimmed(rest.substr(blank)));
   if (!columns || *columns != 2 || !count || *count == 0 || *count > 100000)
-    lines.fail(std::string("'") + name + " 2 COUNT'");
+    lines.fail(std::string("'") + name + " 2 COUNT' with at least one and at most 100000 points");
   std::vector<Vector<2>> points;
   while (points.size() < *count) {
     if (!lines.next('#')) lines.fail(std::to_string(*count) + " points, the file ends before");

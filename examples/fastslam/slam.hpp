@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -39,7 +40,12 @@ struct SlamOptions {
   /// have passed, so that a log costs O(its length) times its logarithm, nor, without names, a hundred; and
   /// at the log's end. 0: never, which is FastSLAM as published.
   double redraw_below = 0.5;
-  cairn::LandmarkOptions landmarks{.pick = cairn::Pick::drawn, .gate = 0.999};
+  /// All landmarks are kept. One that is not seen though it is in view, as a code on the far side of its
+  /// post, would be taken away and be another when it is seen again: nothing then ties the two visits
+  /// together. And names are judged along paths that differ from the one they were found on, where others
+  /// would be gone.
+  cairn::LandmarkOptions landmarks{
+      .pick = cairn::Pick::drawn, .gate = 0.999, .remove_below = -std::numeric_limits<double>::infinity()};
 };
 
 struct StepRecord {
