@@ -53,4 +53,14 @@ template <class Processed, class Pose>
   return all;
 }
 
+/// Odometry alone, from a pose on.
+[[nodiscard]] inline std::vector<cairn::StampedPose2> odometry_from(
+    const cairn::SE2& start, const std::vector<cairn::StampedScan>& scans) {
+  std::vector<cairn::StampedPose2> all;
+  all.reserve(scans.size());
+  for (const cairn::StampedScan& scan : scans)
+    all.push_back({scan.time, start * (scans.front().T_odom_laser.inverse() * scan.T_odom_laser)});
+  return all;
+}
+
 }  // namespace grid_slam

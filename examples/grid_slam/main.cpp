@@ -32,9 +32,11 @@ namespace {
 using namespace grid_slam;
 
 enum class Maps { tiles, ancestry, stop };
+enum class Frame { odometry, start };
 
 struct Options {
   Maps map = Maps::tiles;
+  Frame frame = Frame::odometry;
   StopProposal proposal = StopProposal::motion;
   std::string log, relations;
   bool simulate = false;
@@ -90,6 +92,7 @@ Mapper mapper_of(const Options& options) {
   made.seed = options.seed.value_or(made.seed);
   made.threads = options.threads;
   made.cell_size = options.resolution.value_or(made.cell_size);
+  if (options.frame == Frame::start) made.start = cairn::SE2();
   return Mapper(made);
 }
 
@@ -160,6 +163,10 @@ int main(int argc, char** argv) {
       ->transform(
           example::one_of<Maps>({{"tiles", Maps::tiles}, {"stop", Maps::stop}, {"ancestry", Maps::ancestry}}))
       ->type_name("NAME");
+  app.add_option("--frame", options.frame,
+                 "of the map: odometry's, or start, the laser's first pose, wherever odometry begins")
+      ->transform(example::one_of<Frame>({{"odometry", Frame::odometry}, {"start", Frame::start}}))
+      ->type_name("NAME");
   app.add_option("--proposal", options.proposal,
                  "of --map stop and ancestry: poses drawn from odometry (motion), or where the scan matches")
       ->transform(
@@ -193,6 +200,8 @@ int main(int argc, char** argv) {
       cairn::raise("--save and --load are for --map tiles");
     if (options.map == Maps::tiles && app.count("--proposal") > 0)
       cairn::raise("--proposal is for --map stop and --map ancestry");
+    if (app.count("--frame") > 0 && (options.map != Maps::tiles || !options.load.empty()))
+      cairn::raise("--frame is for a new map of --map tiles");
     check_save(options.save);
     const Input input = input_of(options);
     std::optional<Mapper> mapper;

@@ -128,7 +128,7 @@ void Mapper::begin(const cairn::StampedScan& scan) {
   if (frozen_)
     belief_.emplace(start_->mean, *frozen_, options_.particles);
   else
-    belief_.emplace(scan.T_odom_laser, empty_map(), options_.particles);
+    belief_.emplace(options_.start.value_or(scan.T_odom_laser), empty_map(), options_.particles);
 }
 
 Mapper Mapper::localiser(const std::filesystem::path& path, const MapRequest& wanted,
@@ -269,6 +269,7 @@ void Mapper::process(const cairn::StampedScan& scan) {
   points_.push_back(cairn::scan_points(scan.scan));
   FromMatch proposal;
   proposal.widened = options_.widened;
+  proposal.draws = options_.draws;
   proposal.evidence_share = options_.evidence_share;
   const cairn::ConditionalFilter filter{.resample_below = options_.resample_below,
                                         .evidence_share = options_.evidence_share,
@@ -418,12 +419,11 @@ std::optional<Mapper::MeasuredLoop> Mapper::measured_loop(const std::vector<SE2>
   const double least = options.enough_of_many;
   if (result.inliers < least || result.matched < least || !information.good()) return std::nullopt;
   const SE2 shift = now.inverse() * found->pose;
-  if (shift.translation().norm() > options.moved || std::abs(shift.angle()) > options.turned) {
-    // In a corridor whose doors all look alike the best place is one of many.
-    const auto alike = search.find_places(coarse, now, around, 2, {options.look_alike, 1},
-                                          options.still_alike * found->score);
-    if (alike.size() == 2) return std::nullopt;
-  }
+  const bool moves = shift.translation().norm() > options.moved || std::abs(shift.angle()) > options.turned;
+  // In a corridor whose doors all look alike the best place is one of many.
+  if (moves &&
+      search.has_look_alike(*found, coarse, now, around, {options.look_alike, 1}, options.still_alike))
+    return std::nullopt;
   std::size_t first = begin;
   const auto distance = [&](std::size_t i) {
     return (poses[i].translation() - result.pose.translation()).norm();

@@ -61,6 +61,9 @@ struct LoopOptions {
 };
 
 struct MapperOptions {
+  /// Of the laser in the map: odometry's first where there is none. The same for all logs, what comes out
+  /// does not depend on where odometry has its origin.
+  std::optional<cairn::SE2> start{};
   std::size_t particles = 30;
   std::uint64_t seed = 1;
   unsigned threads = 1;
@@ -78,7 +81,9 @@ struct MapperOptions {
   double slip_angle = 0.25;     ///< [rad]
   double resample_below = 0.5;
   double evidence_share = 0.12;
+  /// FromMatch's, narrower than the posterior: by its own defaults one seed of four lost ACES (docs/grid.md).
   double widened = 1;
+  std::size_t draws = 1;
   LoopOptions loops{};
 };
 

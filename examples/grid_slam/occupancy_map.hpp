@@ -18,6 +18,7 @@
 #include <optional>
 #include <vector>
 
+#include <cairn/core/check.hpp>
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/random.hpp>
@@ -45,7 +46,10 @@ struct OccupancyMap {
   void insert(const Pose& x, const Observation& z) { grid.insert(x, z); }
 };
 
-/// Draws from a Gaussian fitted to likelihood times motion around their best pose.
+/// Draws from a Gaussian fitted to likelihood times motion around their best pose: several poses, of which
+/// one is kept by its weight. The likelihood of a scan is flatter than its curvature at the best pose says,
+/// so that they are drawn wider than that; what is kept then has nearly the posterior's distribution, also
+/// where only a part of a weight counts afterwards.
 struct FromMatch {
   /// A search with a wider kernel, which bridges more and needs neither all points nor the last millimetre.
   struct Coarse {
@@ -69,7 +73,8 @@ struct FromMatch {
   /// As the filter's. Rare motions are drawn by as much of what they gain as counts: one that a single scan
   /// favours leaves some particles to the others, and the scans after it decide.
   double evidence_share = 1;
-  double widened = 1.0;  ///< standard deviations of the draws over those fitted
+  double widened = 1.5;   ///< standard deviations of the draws over those fitted
+  std::size_t draws = 4;  ///< at least 1
 
   [[nodiscard]] cairn::Proposed<cairn::SE2> operator()(const OccupancyMap& map,
                                                        const cairn::RegimeMotion<cairn::SE2>& motion,
@@ -94,19 +99,14 @@ struct FromMatch {
       shares.push_back(std::log(peak.mode->share) + counts * (peak.log_evidence - likely));
     }
     const double total = cairn::log_sum_exp(shares);
-    double left = random.uniform();
-    std::size_t chosen = 0;
-    while (chosen + 1 < peaks.size() && left >= std::exp(shares[chosen] - total))
-      left -= std::exp(shares[chosen++] - total);
+    const std::size_t chosen = one_by_weight(shares, total, random);
     const Peak& peak = peaks[chosen];
-    const cairn::SE2 x = cairn::sample(peak.q, random);
-    const double l = cairn::log_likelihood(map.grid, looked.field, z, x, map.model);
-    const double log_target = l + cairn::log_density(peak.mode->motion, x);
-    const double log_drawn = peak.log_evidence + cairn::log_density(peak.q, x);
-    return {x, peak.q, likely + total / evidence_share + log_target - log_drawn, l, peak.mode->regime};
+    const Kept kept = drawn(map, looked, peak, z, random);
+    return {kept.pose, peak.q, likely + total / evidence_share + kept.log_weight - peak.log_evidence,
+            kept.log_likelihood, peak.mode->regime};
   }
 
-  /// The Gaussian that poses are drawn from under one motion, if the scan fits there at all.
+  /// The Gaussian fitted under one motion, if the scan fits there at all.
   [[nodiscard]] std::optional<cairn::Gaussian<cairn::SE2>> found(const OccupancyMap& map,
                                                                  const cairn::Gaussian<cairn::SE2>& motion,
                                                                  const OccupancyMap::Observation& z) const {
@@ -130,6 +130,42 @@ private:
     cairn::OccupancyGrid::Field field;
     std::vector<cairn::ScanPoint> few;
   };
+
+  /// One of several poses, kept by its weight, and the logarithm of the mean of their weights: as unbiased as
+  /// that of one draw, and steadier.
+  struct Kept {
+    cairn::SE2 pose;
+    double log_likelihood, log_weight;
+  };
+  [[nodiscard]] Kept drawn(const OccupancyMap& map, Looked& looked, const Peak& peak,
+                           const OccupancyMap::Observation& z, cairn::Random& random) const {
+    CAIRN_EXPECTS(draws > 0, "FromMatch needs at least one draw");
+    const cairn::Gaussian<cairn::SE2> wide{peak.q.mean, widened * widened * peak.q.covariance};
+    std::vector<Kept> all;
+    std::vector<double> log_weights;
+    for (std::size_t k = 0; k < draws; ++k) {
+      const cairn::SE2 x = cairn::sample(wide, random);
+      const double l = cairn::log_likelihood(map.grid, looked.field, z, x, map.model);
+      log_weights.push_back(l + cairn::log_density(peak.mode->motion, x) - cairn::log_density(wide, x));
+      all.push_back({x, l, 0});
+    }
+    const double total = cairn::log_sum_exp(log_weights);
+    const std::size_t chosen = draws == 1 ? 0 : one_by_weight(log_weights, total, random);
+    all[chosen].log_weight = total - std::log(static_cast<double>(draws));
+    return all[chosen];
+  }
+
+  /// An index, drawn; `total` is the logarithm of the weights' sum.
+  [[nodiscard]] static std::size_t one_by_weight(const std::vector<double>& log_weights, double total,
+                                                 cairn::Random& random) {
+    std::size_t chosen = 0;
+    for (double left = random.uniform(); chosen + 1 < log_weights.size(); ++chosen) {
+      const double share = std::exp(log_weights[chosen] - total);
+      if (!(left >= share)) break;
+      left -= share;
+    }
+    return chosen;
+  }
 
   /// Of the likely motions that explain the scan at all, the best one's.
   [[nodiscard]] std::optional<double> likely_evidence(const std::vector<Peak>& peaks) const {
@@ -175,7 +211,7 @@ private:
     const double enough = mode.share < rare_share ? rare_explained : explained_well;
     if (mode.share < likely_share && found.inliers < enough) return found.inliers;
     peaks.push_back({&mode,
-                     {found.pose, widened * widened * information.inverse()},
+                     {found.pose, information.inverse()},
                      found.log_likelihood + found.log_prior -
                          0.5 * (motion.log_determinant() + information.log_determinant())});
     return found.inliers;

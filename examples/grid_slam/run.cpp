@@ -5,6 +5,8 @@
 #include <chrono>
 #include <ctime>
 
+#include "filled_path.hpp"
+
 namespace grid_slam {
 
 void measure(Results& r, const std::vector<cairn::PoseRelation>& relations) {
@@ -33,13 +35,13 @@ Results run(Mapper& mapper, const cairn::CarmenLog& log, const std::vector<cairn
   }
   if (frames > 0 && !mapper.scans().empty()) r.snapshots.push_back(snapshot_of(mapper));
   r.scans = mapper.scans().size();
-  for (const cairn::StampedScan& scan : mapper.scans()) r.odometry.push_back({scan.time, scan.T_odom_laser});
   r.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   r.cpu_seconds = static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC;
   r.steps = mapper.steps();
   r.loops = mapper.loops();
   r.places = mapper.places();
   r.drawn = mapper.trajectory(false);
+  r.odometry = odometry_from(r.drawn.front().pose, mapper.scans());
   r.means = mapper.trajectory(true);
   r.rematched = mapper.rematched();
   r.newest = mapper.belief().pose();

@@ -74,9 +74,10 @@ struct MatchedStopMap {
     occupancy.insert(x, z.points);
   }
 
-  /// Draws where the occupancy says, and weighs by the stops: the weight is exact for any density drawn from.
+  /// Draws where the occupancy says, and weighs by the stops: the weight is exact for any density that single
+  /// poses are drawn from.
   struct Match {
-    FromMatch match{};
+    FromMatch match{.widened = 1, .draws = 1};
 
     [[nodiscard]] cairn::Proposed<SE2> operator()(const MatchedStopMap& map, const Gaussian<SE2>& motion,
                                                   const Observation& z, cairn::Random& random) const {

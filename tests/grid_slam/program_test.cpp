@@ -12,6 +12,7 @@
 
 #include <cairn/io/file.hpp>
 #include <cairn/io/netpbm.hpp>
+#include <cairn/io/trajectory.hpp>
 #include <cairn/version.hpp>
 
 #include "floor_plan.hpp"
@@ -70,7 +71,8 @@ TEST_SUITE("grid_slam/program") {
         {"--nonsense", "--particles 0", "--threads 0", "--seed -1", "--log " + named("none"),
          "--log " + named("empty"), "--log " + named("torn"), "--log " + named("nan"),
          "--log " + named("still"), "--log " + named("log") + " --relations " + named("log"),
-         "--simulate --log " + named("log")},
+         "--simulate --log " + named("log"), "--frame nowhere", "--frame start --map stop",
+         "--frame start --load " + named("log")},
         300);
     CHECK_FALSE(fs::exists(folder / "out"));
   }
@@ -102,6 +104,23 @@ TEST_SUITE("grid_slam/program") {
     CHECK(yaml.find("image: map.pgm\n") == 0);
     const std::string path = cairn::read_file(folder / "1" / "trajectory.txt");
     CHECK(std::count(path.begin(), path.end(), '\n') == 150);
+  }
+
+  TEST_CASE("grid_slam: a map of --frame start begins at the laser's first pose, wherever odometry does") {
+    const cairn_test::Folder folder;
+    folder.put("log", short_log(40));
+    const auto begin = [&](const std::string& frame) {
+      const std::string out = (folder / frame).string();
+      const Outcome outcome = run("--particles 2 --frame " + frame + " --log \"" + (folder / "log").string() +
+                                  "\" --out \"" + out + "\"");
+      CAPTURE(outcome.words);
+      REQUIRE(outcome.code == 0);
+      return cairn::read_tum(folder / frame / "trajectory.txt").front().T_world_body;
+    };
+    const cairn::SE3 start = begin("start"), odometry = begin("odometry");
+    CHECK(start.log().norm() < 1e-9);
+    const cairn::SE2 by_log = grid_slam::simulated_drive({.seed = 3}).log.scans.front().T_odom_laser;
+    CHECK((odometry.translation().head<2>() - by_log.translation()).norm() < 1e-9);
   }
 
   TEST_CASE("grid_slam: a log in two runs, by way of a saved map, gives the bytes of one run") {

@@ -111,6 +111,50 @@ TEST_SUITE("scan/correlative") {
     CHECK(seconds > 50);
   }
 
+  TEST_CASE(
+      "correlative: in a row of equal rooms a scan of one has look-alikes, in one with a cupboard none") {
+    // Three rooms of 2 x 2 m in a row, seen from the middle of the second; a cupboard stands in a corner of
+    // one or of each.
+    const auto rooms = [](const std::vector<int>& with_cupboard) {
+      ScoreGrid grid({0.1, 0, 0}, {-5, -5}, 70, 30);
+      for (int room = 0; room < 3; ++room) {
+        for (int i = 0; i <= 20; ++i)
+          for (const auto& [column, row] : {std::pair{i, 0}, {i, 20}, {0, i}, {20, i}})
+            grid(5 + 20 * room + column, 5 + row) = 255;
+        if (std::ranges::count(with_cupboard, room) == 0) continue;
+        for (int i = 0; i <= 8; ++i)
+          for (const auto& [column, row] : {std::pair{i, 8}, {8, i}})
+            grid(5 + 20 * room + column, 5 + row) = 255;
+      }
+      return CorrelativeSearch(grid);
+    };
+    std::vector<ScanPoint> seen;  // from the middle of a room with a cupboard
+    for (int i = -10; i <= 10; ++i)
+      for (const auto& [x, y] : {std::pair{i, -10}, {i, 10}, {-10, i}, {10, i}})
+        seen.push_back({0.1 * x, 0.1 * y});
+    for (int i = -10; i <= -2; ++i)
+      for (const auto& [x, y] : {std::pair{i, -2}, {-2, i}}) seen.push_back({0.1 * x, 0.1 * y});
+    const SE2 middle(3.05, 1.05, 0);
+    const SearchWindow window{2.5, 0.5, 0.1};
+    const PlacesApart apart{0.7, 1};
+    const auto answer = [&](const CorrelativeSearch& search, double share) {
+      const auto found = search.find(seen, middle, window);
+      REQUIRE(found);
+      CHECK(found->score == doctest::Approx(1));
+      return search.has_look_alike(*found, seen, middle, window, apart, share);
+    };
+    CHECK(answer(rooms({0, 1, 2}), 0.9));
+    CHECK(answer(rooms({1, 2}), 0.9));
+    CHECK_FALSE(answer(rooms({1}), 0.9));
+    CHECK(answer(rooms({1}), 0.7));  // the walls alone
+    // Of a window that holds one room alone, that is the only one.
+    const CorrelativeSearch equal = rooms({0, 1, 2});
+    const SearchWindow narrow{1.5, 0.5, 0.1};
+    const auto found = equal.find(seen, middle, narrow);
+    REQUIRE(found);
+    CHECK_FALSE(equal.has_look_alike(*found, seen, middle, narrow, apart, 0.9));
+  }
+
   TEST_CASE("correlative: a square's largest is the largest of its cells") {
     const std::uint64_t seed = cairn_test::seed(2);
     CAPTURE(seed);

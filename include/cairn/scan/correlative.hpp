@@ -231,6 +231,15 @@ public:
     return places;
   }
 
+  /// Whether `found` is one of several places that look alike: whether another pose of the lattice, `apart`
+  /// or more from it, has more than `share` of its score. As in a corridor all of whose doors are equal.
+  /// Throws as find().
+  [[nodiscard]] bool has_look_alike(const CorrelativeMatch& found, std::span<const ScanPoint> points,
+                                    const SE2& middle, const SearchWindow& window, const PlacesApart& apart,
+                                    double share) const {
+    return find_beside({found}, apart, points, middle, window, share * found.score).has_value();
+  }
+
   /// The score of one pose, in the cells that its points fall into.
   [[nodiscard]] double score(std::span<const ScanPoint> points, const SE2& pose) const {
     long sum = 0;
