@@ -3,14 +3,18 @@
 #include "lines.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <iostream>
 #include <string>
 #include <thread>
 #include <vector>
 
+#include <cairn/core/statistics.hpp>
+
 #include "line_slam/drive.hpp"
 #include "line_slam/run.hpp"
+#include "support/line_nees.hpp"
 
 void add_lines(cairn_bench::Scoreboard& board) {
   constexpr std::uint64_t first_seed = 101, seeds = 5;
@@ -43,4 +47,11 @@ void add_lines(cairn_bench::Scoreboard& board) {
                 .better = cairn_bench::larger,
                 .note = "least of 5 seeds " + std::to_string(*std::ranges::min_element(odometry))});
   board.add(Row{.name = "the same: CPU of the filter", .measured = middle(seconds), .unit = "s"});
+  const cairn_test::LineNees nees = cairn_test::nees_of_lines(first_seed, 500);
+  const auto band = cairn::chi_square_mean_band(4, static_cast<double>(nees.lines), 0.99);
+  board.add(Row{.name = "mean NEES of 500 lines mapped along the true path, off 4",
+                .measured = std::abs(nees.mean() - 4),
+                .unit = "",
+                .must = std::min(4 - band.low, band.high - 4),
+                .note = "must: the band of 99 %"});
 }

@@ -8,20 +8,18 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
 
 #include <cairn/core/check.hpp>
-#include <cairn/core/cholesky.hpp>
 #include <cairn/core/random.hpp>
 #include <cairn/core/statistics.hpp>
-#include <cairn/geometry/line.hpp>
 
 #include "batch.hpp"
 #include "drive.hpp"
+#include "support/line_nees.hpp"
 #include "support/random.hpp"
 
 namespace line_run_test {
@@ -29,52 +27,15 @@ namespace {
 
 using namespace line_slam;
 
-/// Squared error of a line over its covariance; nothing where the true one is not before the line's anchor.
-std::optional<double> nees(const cairn::Gaussian<MappedLine>& belief, const Edge& edge) {
-  const auto truth = belief.mean.line.about(cairn::Line::through(edge.from, edge.to));
-  if (!truth) return std::nullopt;
-  const cairn::Cholesky<4> root(belief.covariance);
-  REQUIRE(root.good());
-  return root.whiten(cairn::local(belief.mean.line, *truth)).squaredNorm();
-}
-
 }  // namespace
 
 TEST_SUITE("line_slam/run") {
   TEST_CASE("line_slam: NEES of 500 lines that are mapped with the true poses is in its band") {
     const auto seed = cairn_test::seed();
     CAPTURE(seed);
-    double sum = 0;
-    std::size_t count = 0;
-    for (std::uint64_t campus = 0; count < 500; ++campus) {
-      DriveOptions options{.seed = seed * 100 + campus, .metres = 120};
-      options.detector.made_up = 0;
-      options.detector.broken = 0;  // pieces that are joined again err less than a segment, as they should
-      const Drive drive = simulated_drive(options);
-      LineSensor sensor;
-      sensor.rig = std::make_shared<const Rig>(drive.rig);
-      sensor.sigma = options.detector.sigma;
-      cairn::LandmarkOptions landmarks = RunOptions{}.landmarks;
-      landmarks.gate_of_named = landmarks.gate;  // as the program, which knows no names
-      Map map(sensor, landmarks);
-      for (std::size_t k = 0; k < drive.frames.size(); ++k) {
-        Map::Observation seen;
-        for (const auto& sighting : drive.frames[k].seen)  // as many as are told apart without doubt
-          if (sighting.z.edge != no_edge) seen.push_back({sighting.z, sighting.z.edge});
-        cairn::Random none(1);
-        map.insert(drive.truth[k], seen, map.choose(drive.truth[k], seen, none).choice);
-      }
-      map.for_each([&](std::uint32_t edge, const cairn::MappedLandmark<MappedLine>& landmark) {
-        if (landmark.sightings < 2) return;  // what one sighting says is in tests/geometry
-        if (const auto e = nees(landmark.belief, drive.campus.edges()[edge])) {
-          sum += *e;
-          ++count;
-        }
-      });
-    }
-    MESSAGE(count, " lines, NEES ", sum / static_cast<double>(count));
-    CHECK(cairn::chi_square_mean_band(4, static_cast<double>(count), 0.999)
-              .contains(sum / static_cast<double>(count)));
+    const cairn_test::LineNees nees = cairn_test::nees_of_lines(seed, 500);
+    MESSAGE(nees.lines, " lines, NEES ", nees.mean());
+    CHECK(cairn::chi_square_mean_band(4, static_cast<double>(nees.lines), 0.999).contains(nees.mean()));
   }
 
   TEST_CASE("line_slam: particles map a side of the campus nearly as well as the true poses do") {

@@ -48,9 +48,10 @@ TEST_SUITE("scripts") {
     for (const char* mistake :
          {"check_headers nonsense", "install", "install nonsense", "install test nonsense", "scoreboard",
           "scoreboard nonsense", "scoreboard main_job nonsense", "scoreboard index low nonsense",
-          "scoreboard index --preset nonsense", "benchmark --only", "benchmark --preset nonsense",
-          "include_cost nonsense", "include_cost cairn/nonsense.hpp", "course nonsense", "course 01 nonsense",
-          "course 01 --seed nonsense", "course 01 --steps=nonsense", "course --seed"})
+          "scoreboard fastslam robots nonsense", "scoreboard index --preset nonsense", "benchmark --only",
+          "benchmark --preset nonsense", "include_cost nonsense", "include_cost cairn/nonsense.hpp",
+          "course nonsense", "course 01 nonsense", "course 01 --seed nonsense", "course 01 --steps=nonsense",
+          "course --seed"})
       mistakes.emplace_back(mistake);
     for (const std::string& mistake : mistakes) {
       CAPTURE(mistake);
