@@ -5,10 +5,11 @@
 scripts/course in the folder COURSE.
 make_site.py picture PAGE FIGURE WIDTHxHEIGHT PNG: a picture of one figure of a report page, as README.md has one.
 make_site.py links: looks at the links of the documents only, as GitHub shows them. Ends with 1, and a line for each fault, where a link leads nowhere, a picture is missing, a page
-asks for something from a network, or Doxygen does not understand a page of docs/."""
+asks for something from a network or is wider than a phone, or Doxygen does not understand a page of docs/."""
 import csv
 import html
 import html.parser
+import json
 import math
 import os
 import pathlib
@@ -347,6 +348,42 @@ def readme_faults():
                     yield f"{path.relative_to(ROOT)} leads to {target}, and there is no such heading"
 
 
+PHONE = """<!doctype html>
+<iframe id="phone" width="390" height="844"></iframe>
+<script>
+(async () => {
+  const phone = document.getElementById('phone'), wide = [];
+  for (const name of NAMES) {
+    await new Promise((loaded) => { phone.onload = loaded; phone.src = SITE + name; });
+    const page = phone.contentDocument.documentElement;
+    if (page.scrollWidth > page.clientWidth) wide.push(`${name} is ${page.scrollWidth} pixels wide on a phone of ${page.clientWidth}`);
+  }
+  document.body.replaceChildren(Object.assign(document.createElement('pre'), { textContent: ['looked', ...wide].join('\\n') }));
+})();
+</script>
+"""
+
+
+def phone_faults(site):
+    """One for each page that a phone would have to scroll sideways."""
+    browser = chromium()
+    if browser is None:
+        return
+    names = sorted(path.relative_to(site).as_posix() for path in site.rglob("*.html") if not path.stem.endswith("_source"))
+    with tempfile.TemporaryDirectory() as folder:
+        phone = pathlib.Path(folder) / "phone.html"
+        phone.write_text(PHONE.replace("NAMES", json.dumps(names)).replace("SITE", json.dumps(site.as_uri() + "/")), encoding="utf-8")
+        seen = subprocess.run(
+            [browser, "--headless", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run", "--allow-file-access-from-files",
+             f"--virtual-time-budget={1000 * len(names)}", f"--user-data-dir={folder}/profile", "--dump-dom", phone.as_uri()],
+            capture_output=True, text=True, timeout=600).stdout
+    found = re.search(r"<pre>looked\n?(.*?)</pre>", seen, flags=re.DOTALL)
+    if not found:
+        yield "no page could be looked at as on a phone"
+        return
+    yield from html.unescape(found.group(1)).splitlines()
+
+
 # The figure of a lesson's page that stands for it; the first, where none is named.
 SHOWN = {"12_visual_slam": 2}
 
@@ -376,7 +413,7 @@ def main():
     find_page(site)
     source_pages(site)
     mended(site)
-    faults += [*readme_faults(), *link_faults(site)]
+    faults += [*readme_faults(), *link_faults(site), *phone_faults(site)]
     for fault in faults:
         print(f"docs: {fault}", file=sys.stderr)
     sys.exit(1 if faults else 0)
