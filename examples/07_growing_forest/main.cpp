@@ -17,7 +17,7 @@
 // ... one step moves all there is: amortised is not worst-case.
 //
 // Now change this (answers at the end): (1) --steps 512: how large is the worst step now? (2) .growth = 4:
-// fewer moves? And trees? (3) .merging = cairn::Merging::spread: what is the worst step then, and who pays?
+// fewer moves? And trees? (3) .merging = cairn::Merging::spread: which step is long then, and who pays?
 #include <algorithm>
 #include <array>
 #include <bit>
@@ -145,6 +145,6 @@ int main(int argc, char** argv) {
   return lesson.finish();
 }
 
-// Answers. (1) Twice as large: step 512 carries through all digits and moves everything. (2) Half as many
-// digits, so fewer moves, but up to three trees a digit to search. (3) Each step does its share of every
-// merge under way; until it is done the old trees are searched: a few more of them.
+// Answers. (1) Twice as large and more: step 512 carries through all digits. (2) Half as many digits, so
+// fewer moves, but up to three trees a digit to search. (3) None is long: each does its share of all merges,
+// though the count gets a merge whole, when it ends. Until then old trees are searched: a few more of them.

@@ -146,5 +146,5 @@ int main(int argc, char** argv) {
   return lesson.finish();
 }
 // ANSWERS  1. All help, none enough: posts 0.3 m apart under 0.2 m of noise grow together into one place.
-// 2. Four ghosts of 470: to pass, an echo has to repeat itself in space, which is rare. Its price is time.
+// 2. Four ghosts of 458: to pass, an echo has to repeat itself in space, which is rare. Its price is time.
 // 3. The map: only what agrees with it is let in, so it believes itself too much. NEES is 6.
