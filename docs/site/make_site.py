@@ -268,8 +268,8 @@ def lessons(site, course):
                                check=True).stdout.splitlines()
         picture = ""
         if browser and screenshot(browser, target / "index.html", f"?theme=light&figure={SHOWN.get(folder.name, 1)}",
-                                  target / "figure.png", 640, 640):
-            picture = f'<img src="lessons/{folder.name}/figure.png" alt="A figure of the lesson\'s page" width="640" height="640" loading="lazy"/>'
+                                  target / "figure.png", 640, 720):
+            picture = f'<img src="lessons/{folder.name}/figure.png" alt="A figure of the lesson\'s page" width="640" height="720" loading="lazy"/>'
         source = page.source_page(f"examples/{folder.name}/main.cpp")
         items.append(f'<li>{picture}<h2>{html.escape(about[0])}</h2><p>{html.escape(about[1])}</p>'
                      f'<p><a href="lessons/{folder.name}/index.html">Its page</a>, <a href="{source}">the program</a></p></li>')

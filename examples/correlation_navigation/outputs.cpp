@@ -38,17 +38,19 @@ struct StateName {
 };
 constexpr std::array<StateName, 5> state_names{
     {{"x", "Position along track", "m", 1,
-      "Straight flight over a Gaussian random field, the founding document's figure 2: the errors made, what "
-      "the "
-      "filter says of them, and the Cramer-Rao bound, which no unbiased estimator can go below. Frames are "
-      "30 m a sample."},
+      "Straight flight over a Gaussian random field, x is the way along it: the errors made, what the filter "
+      "says of them, and the Cramer-Rao bound, which no unbiased estimator can go below. Frames are 30 m a "
+      "sample."},
      {"V", "Velocity", "m/s", 1,
-      "Not measured, but frames at different times tell it: it falls faster than the position."},
+      "The ground speed V is not measured, but frames at different times tell it: its error falls faster "
+      "than "
+      "the position's."},
      {"L_x", "Scale along track", "m", 1,
-      "True distance between two samples, 30 m nominal: height above ground is not known exactly."},
-     {"L_y", "Scale across track", "m", 1, "The same across track."},
+      "L_x is the true distance between two samples, 30 m nominal: height above ground is not known "
+      "exactly."},
+     {"L_y", "Scale across track", "m", 1, "L_y, the same across track."},
      {"psi", "Heading error", "deg", 180 / std::numbers::pi,
-      "Between the sensor's axis and the track; wide frames see it well."}}};
+      "psi is the angle between the sensor's axis and the track; wide frames see it well."}}};
 
 std::vector<double> scaled(std::vector<double> values, double factor) {
   for (double& value : values) value *= factor;
@@ -112,7 +114,7 @@ void add_straight(example::Report& page, const Results& r) {
           "Position sigma at the end of the flight for errors of sensor and map (in units of the "
           "field). The map's error dominates as soon as it is half the sensor's: its samples err "
           "together and do not average out. Hence the loop below.",
-      .columns = {"sensor", "map", "position sigma [m]"}};
+      .columns = {"sensor error", "map error", "position sigma [m]"}};
   for (const BudgetRow& row : r.budget)
     budget.rows.push_back({readable(row.sensor_noise), readable(row.map_error), readable(row.final_sigma)});
   page.add(budget);
