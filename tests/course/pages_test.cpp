@@ -15,6 +15,7 @@
 
 #include "support/browser.hpp"
 #include "support/folder.hpp"
+#include "support/page_check.hpp"
 #include "support/program.hpp"
 #include "support/report.hpp"
 
@@ -45,69 +46,20 @@ setTimeout(async () => {
 }, 500);
 </script>)";
 
-// Presses every button that saves a figure, and catches the files instead of saving them.
-const char* const saver = R"(
-<script>
-setTimeout(async () => {
-  const files = [];
-  HTMLAnchorElement.prototype.click = function () { files.push(fetch(this.href).then((answer) => answer.blob())); };
-  const buttons = [...document.querySelectorAll('button.save')];
-  for (const button of buttons) button.click();
-  await new Promise((done) => setTimeout(done, 1500));
-  const saved = (await Promise.all(files)).filter((file) => file.type === 'image/png' && file.size > 1000);
-  document.documentElement.dataset.saved = `${saved.length} of ${buttons.length} saved`;
-}, 1500);
-</script>)";
-
 // Keeps what is written on canvases: numbers of axes, and all of a figure that is saved.
 const char* const listener = R"(<script>
 const said = new Set();
 const write = CanvasRenderingContext2D.prototype.fillText;
 CanvasRenderingContext2D.prototype.fillText = function (text, ...where) {
   said.add(text);
+  document.documentElement.dataset.said = [...said].join('|');
   return write.call(this, text, ...where);
 };
-setTimeout(() => { document.documentElement.dataset.said = [...said].join('|'); }, 3500);
 </script>)";
 
 /// The page with this script before its own.
 std::string before_all(std::string page, const std::string& script) {
   return page.insert(page.find("<main"), script);
-}
-
-/// axe-core's verdict on the page, or nothing where npm did not bring it.
-std::string judge() {
-  const fs::path axe = CAIRN_AXE;
-  if (!fs::exists(axe)) return {};
-  return "<script>" + cairn::read_file(axe) + R"(</script><script>
-setTimeout(async () => {
-  const { violations } = await axe.run(document, {});
-  const words = violations.map((one) => `${one.id}: ${one.nodes[0].html.slice(0, 100)}`).join('; ');
-  document.documentElement.dataset.axe = `${violations.length} violations ${words}`;
-}, 2500);
-</script>)";
-}
-
-void check_accessible(const OpenedPage& opened) {
-  if (!fs::exists(CAIRN_AXE)) {
-    MESSAGE("skipped: no axe-core (npm)");
-    return;
-  }
-  const std::size_t at = opened.document.find("data-axe=\"");
-  REQUIRE(at != std::string::npos);
-  const std::string verdict = opened.document.substr(at, 300);
-  CAPTURE(verdict);
-  CHECK(verdict.find("data-axe=\"0 violations") == 0);
-}
-
-bool can_open() {
-  if (!example::has_report_page())
-    MESSAGE("skipped: built without the page (npm)");
-  else if (!cairn_test::has_chromium())
-    MESSAGE("skipped: no chromium");
-  else
-    return true;
-  return false;
 }
 
 /// What stands from one mark to the next other one.
@@ -148,15 +100,11 @@ void check_opens(const std::string& lesson) {
   REQUIRE(outcome.code == 0);
   const fs::path page = folder / "out" / "index.html";
   REQUIRE(cairn_test::keep_picture(folder, page, lesson, 2000));
-  cairn::write_file_atomically(page, cairn::read_file(page) + mover + judge());
-  const OpenedPage opened = cairn_test::open_page(folder, page);
-  CHECK(opened.console == "");
-  CHECK(opened.has("data-panels="));
+  const OpenedPage opened = cairn_test::check_page(page, mover);
   CHECK(opened.has("class=\"figure good\""));
   CHECK_FALSE(opened.has("class=\"empty\""));
   CHECK(says(opened, "NEES") == explains(opened, "NEES"));
   check_sliders_move(opened);
-  check_accessible(opened);
 }
 
 }  // namespace
@@ -164,13 +112,13 @@ void check_opens(const std::string& lesson) {
 TEST_SUITE_BEGIN("course/pages");
 
 TEST_CASE("course: the page of every lesson opens without a word on the console, and its sliders move") {
-  if (!can_open()) return;
+  if (!cairn_test::can_open_pages()) return;
   for (const std::string& lesson : lessons()) check_opens(lesson);
 }
 
 TEST_CASE(
     "report page: films, heat maps, bands, dots and areas are drawn, gaps and all, and axe finds nothing") {
-  if (!can_open()) return;
+  if (!cairn_test::can_open_pages()) return;
   const double gap = std::numeric_limits<double>::quiet_NaN();
   example::Report report("panels", "");
   report.add(example::LinePlot{.title = "lines",
@@ -191,20 +139,17 @@ TEST_CASE(
   report.figure({"figure", "1", "m", "a hint", example::KeyFigure::Verdict::good});
   report.note("a note");
   const cairn_test::Folder folder;
-  cairn::write_file_atomically(folder / "page.html", report.html().value() + mover + saver + judge());
-  const OpenedPage opened = cairn_test::open_page(folder, folder / "page.html");
-  CHECK(opened.console == "");
+  cairn::write_file_atomically(folder / "page.html", report.html().value());
+  const OpenedPage opened = cairn_test::check_page(folder / "page.html", mover);
   CHECK(opened.has("data-panels=\"6\""));
-  CHECK(opened.has("data-saved=\"5 of 5 saved\""));
   CHECK(opened.count("class=\"heat\"") == 2);
   CHECK(opened.count("<input type=\"range\" min") == 1);
   CHECK(opened.count("href=\"#figure-") == 6);
   check_sliders_move(opened);
-  check_accessible(opened);
 }
 
 TEST_CASE("report page: words that it uses are explained at its end, and others are not") {
-  if (!can_open()) return;
+  if (!cairn_test::can_open_pages()) return;
   example::Report report("words", "");
   report.figure({"ATE", "1", "m", "first", example::KeyFigure::Verdict::good});
   report.add(example::LinePlot{.title = "NIS", .x_values = {0, 1}, .curves = {{"one", Ink::belief, {1, 2}}}});
@@ -220,7 +165,7 @@ TEST_CASE("report page: words that it uses are explained at its end, and others 
 TEST_CASE(
     "report page: a logarithmic axis does not begin at a rounding error, small numbers are short, the legend "
     "shows lines as they are drawn and goes into the file that is saved") {
-  if (!can_open()) return;
+  if (!cairn_test::can_open_pages()) return;
   example::LinePlot plot{.title = "errors", .curves = {{"first", Ink::wrong, {}}, {"second", Ink::teal, {}}}};
   for (int i = 0; i < 200; ++i) {
     plot.x_values.push_back(i);
@@ -233,10 +178,8 @@ TEST_CASE(
   report.add(example::LinePlot{
       .title = "small", .x_values = {0, 1}, .curves = {{"tiny", Ink::belief, {2e-5, 9e-5}}}});
   const cairn_test::Folder folder;
-  cairn::write_file_atomically(folder / "page.html", before_all(report.html().value(), listener) + saver);
-  const OpenedPage opened = cairn_test::open_page(folder, folder / "page.html");
-  CHECK(opened.console == "");
-  CHECK(opened.has("data-saved=\"2 of 2 saved\""));
+  cairn::write_file_atomically(folder / "page.html", before_all(report.html().value(), listener));
+  const OpenedPage opened = cairn_test::check_page(folder / "page.html");
   REQUIRE(opened.has("data-said=\""));
   const std::string said = "|" + between(opened.document, "data-said=\"", "\"") + "|";
   CAPTURE(said);

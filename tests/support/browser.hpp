@@ -22,13 +22,14 @@ inline bool has_chromium() {
   return std::system("command -v chromium >/dev/null 2>&1") == 0;
 }
 
-/// Runs Chromium with more options; its exit code as std::system gives it.
-inline int chromium(const Folder& folder, const std::string& more) {
+/// Runs Chromium with more options; its exit code as std::system gives it. `patience` is the time [ms] that
+/// its pages have by their own clock, which skips what they wait for.
+inline int chromium(const Folder& folder, const std::string& more, int patience = 8000) {
   const std::string command =
       "timeout 120 chromium --headless --no-sandbox --disable-gpu-sandbox --use-angle=swiftshader "
       "--enable-unsafe-swiftshader --disable-dev-shm-usage --no-first-run --enable-logging=stderr "
-      "--virtual-time-budget=8000 --user-data-dir='" +
-      (folder / "profile").string() + "' " + more;
+      "--virtual-time-budget=" +
+      std::to_string(patience) + " --user-data-dir='" + (folder / "profile").string() + "' " + more;
   return std::system(command.c_str());
 }
 
@@ -46,9 +47,11 @@ struct OpenedPage {
 };
 
 /// The document that Chromium makes of what is at the address, and what it said meanwhile.
-inline OpenedPage open_address(const Folder& folder, const std::string& address) {
-  const int status = chromium(folder, "--dump-dom '" + address + "' >'" + (folder / "dom").string() +
-                                          "' 2>'" + (folder / "log").string() + "'");
+inline OpenedPage open_address(const Folder& folder, const std::string& address, int patience = 8000) {
+  const int status = chromium(folder,
+                              "--dump-dom '" + address + "' >'" + (folder / "dom").string() + "' 2>'" +
+                                  (folder / "log").string() + "'",
+                              patience);
   if (status != 0) throw std::runtime_error("chromium did not open " + address);
   OpenedPage opened{cairn::read_file(folder / "dom"), {}};
   std::istringstream log(cairn::read_file(folder / "log"));
@@ -58,8 +61,8 @@ inline OpenedPage open_address(const Folder& folder, const std::string& address)
 }
 
 /// The same of a file.
-inline OpenedPage open_page(const Folder& folder, const std::filesystem::path& page) {
-  return open_address(folder, "file://" + page.string());
+inline OpenedPage open_page(const Folder& folder, const std::filesystem::path& page, int patience = 8000) {
+  return open_address(folder, "file://" + page.string(), patience);
 }
 
 /// NAME-light.png and NAME-dark.png where CAIRN_SCREENSHOTS says; false where Chromium fails.

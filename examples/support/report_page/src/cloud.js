@@ -208,7 +208,8 @@ export function cloud(panel, body) {
     view.applyTheme();
     colours.apply();
     view.draw();
-    help.textContent = `drag to turn, right button to move, wheel to zoom · grid ${readable(view.step)} ${panel.unit}`;
+    const how = matchMedia('(pointer: coarse)').matches ? 'two fingers turn and zoom' : 'drag to turn, right button to move, wheel to zoom';
+    help.textContent = `${how} · grid ${readable(view.step)} ${panel.unit}`;
   };
   restyle();
   onTheme(restyle);

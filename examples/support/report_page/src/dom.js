@@ -37,16 +37,18 @@ export function readable(value) {
   return String(Number(value.toPrecision(4)));
 }
 
-/** Calls change(width, height) at the next frame and whenever the node's width or height has changed. */
+/** Calls change(width, height) now, and at the next frame whenever the node's width or height has changed. */
 export function onResize(node, change) {
   let last = '';
-  // Not inside the observer: what it changes would set it off again.
-  new ResizeObserver(() => requestAnimationFrame(() => {
+  const apply = () => {
     const size = `${node.clientWidth} ${node.clientHeight}`;
     if (node.clientWidth === 0 || size === last) return;
     last = size;
     change(node.clientWidth, node.clientHeight);
-  })).observe(node);
+  };
+  apply();
+  // Not inside the observer: what it changes would set it off again.
+  new ResizeObserver(() => requestAnimationFrame(apply)).observe(node);
 }
 
 /** Lines are told apart by their dashes too: not everybody sees the colours. */

@@ -42,7 +42,8 @@ export function table(panel, body) {
   const numeric = panel.columns.map((_, column) =>
     panel.rows.length > 0 && panel.rows.every((row) => ['', '-'].includes(row[column]) || Number.isFinite(Number(row[column]))));
   const line = (tag, cells) => element('tr', {}, ...cells.map((cell, i) => element(tag, { className: numeric[i] ? 'number' : '' }, cell)));
-  body.append(element('div', { className: 'scroll' },
+  // What scrolls sideways on a phone can be reached by the keyboard.
+  body.append(element('div', { className: 'scroll', tabIndex: 0, role: 'group', ariaLabel: panel.title },
     element('table', { className: 'cells' },
       element('thead', {}, line('th', panel.columns)),
       element('tbody', {}, ...panel.rows.map((row) => line('td', row))))));

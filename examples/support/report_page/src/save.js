@@ -72,7 +72,7 @@ function composed(canvas, title, legend) {
   return sheet;
 }
 
-/** The photograph with the marks that are shown over it, at its own size. */
+/** The photograph with the marks that are shown over it, in whole pixels of its own, at least as large as it is shown. */
 async function photograph(picture) {
   const image = picture.querySelector('img');
   const marks = picture.querySelector('svg').cloneNode(true);
@@ -83,14 +83,17 @@ async function photograph(picture) {
     group.setAttribute('fill', 'none');
     group.setAttribute('stroke-linecap', 'round');
   });
-  marks.setAttribute('width', image.naturalWidth);
-  marks.setAttribute('height', image.naturalHeight);
+  const times = Math.max(1, Math.ceil(image.clientWidth / image.naturalWidth));
+  const [width, height] = [times * image.naturalWidth, times * image.naturalHeight];
+  marks.setAttribute('width', width);
+  marks.setAttribute('height', height);
   const drawn = new Image();
   drawn.src = `data:image/svg+xml,${encodeURIComponent(new XMLSerializer().serializeToString(marks))}`;
   await drawn.decode();
-  const canvas = element('canvas', { width: image.naturalWidth, height: image.naturalHeight });
+  const canvas = element('canvas', { width, height });
   const ctx = canvas.getContext('2d');
-  ctx.drawImage(image, 0, 0);
+  ctx.imageSmoothingEnabled = false;
+  ctx.drawImage(image, 0, 0, width, height);
   ctx.drawImage(drawn, 0, 0);
   return canvas;
 }
