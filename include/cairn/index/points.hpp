@@ -379,16 +379,17 @@ template <class Scalar>
     return "a finite number whose squared differences stay finite";
 }
 
-/// The number as a Scalar; `usable` becomes false where it cannot be one.
+/// The number as a Scalar; `usable`, 1 before, becomes 0 where it cannot be one. Of a number as wide as a
+/// float, not a bool: compilers then look at many coordinates side by side.
 template <class Scalar, class Number>
-[[gnu::always_inline]] inline Scalar to_coordinate(const Number& number, bool& usable) {
+[[gnu::always_inline]] inline Scalar to_coordinate(const Number& number, std::int32_t& usable) {
   if constexpr (std::floating_point<Scalar>) {
     const auto kept = static_cast<Scalar>(number);
-    usable &= std::abs(kept) <= largest_coordinate<Scalar>();  // false for NaN
+    usable &= std::abs(kept) <= largest_coordinate<Scalar>() ? 1 : 0;  // 0 for NaN
     return kept;
   } else {
     const bool whole = is_whole<Scalar>(number);
-    usable &= whole;
+    usable &= whole ? 1 : 0;
     return whole ? static_cast<Scalar>(number) : Scalar{};
   }
 }
@@ -399,15 +400,15 @@ template <class Scalar, Point P>
 void copy_point(const P& point, std::size_t dim, Scalar* row, const PointPlace& entry) {
   if (const std::size_t size = size_of_point(point, dim); size != dim) [[unlikely]]
     refuse_dimension(entry, size, dim);
-  bool usable = true;
+  std::int32_t usable = 1;
   for (std::size_t axis = 0; axis < dim; ++axis)
     row[axis] = to_coordinate<Scalar>(number_at(point, axis), usable);
-  if (usable) [[likely]]
+  if (usable != 0) [[likely]]
     return;
   for (std::size_t axis = 0; axis < dim; ++axis) {
-    bool good = true;
+    std::int32_t good = 1;
     static_cast<void>(to_coordinate<Scalar>(number_at(point, axis), good));
-    if (!good)
+    if (good == 0)
       refuse_coordinate(entry, axis, static_cast<double>(number_at(point, axis)),
                         usable_coordinates<Scalar>());
   }
