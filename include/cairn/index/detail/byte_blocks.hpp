@@ -55,16 +55,26 @@ public:
   ByteQuery() = default;
 
   void set(const std::uint8_t* codes, std::size_t dim) {
-    const std::size_t padded = (dim + lane_axes - 1) / lane_axes * lane_axes;
-    codes_.assign(padded, 0);
-    shifted_.assign(padded, 0);
-    std::memcpy(codes_.data(), codes, dim);
-    std::int32_t square = 0;
+    const std::size_t padded = (dim + block_size - 1) / block_size * block_size;
+    codes_.resize(padded);
+    shifted_.resize(padded);
+    std::uint8_t* own = codes_.data();
     std::int8_t* shifted = shifted_.data();
+    std::fill(own + dim, own + padded, std::uint8_t{0});
+    std::memcpy(own, codes, dim);
+    std::int32_t square = 0;
     with_widest_lanes([&]() CAIRN_INLINED {
-      for (std::size_t a = 0; a < dim; ++a)
-        shifted[a] = static_cast<std::int8_t>(codes[a] ^ 128U);  // less 128
-      for (std::size_t a = 0; a < dim; ++a) square += codes[a] * codes[a];
+      Block<std::int32_t> squares{};
+      for (std::size_t a = 0; a < padded; a += block_size) {
+        Block<std::int32_t> numbers;
+        Block<std::uint8_t> bytes;
+        load_block<std::int32_t>(own + a, numbers);
+        std::memcpy(&bytes, own + a, sizeof(bytes));
+        squares += numbers * numbers;
+        bytes ^= 128;  // less 128
+        std::memcpy(shifted + a, &bytes, sizeof(bytes));
+      }
+      for (std::size_t i = 0; i < block_size; ++i) square += squares[i];
     });
     square_ = square;
   }
@@ -332,7 +342,8 @@ public:
     const std::size_t blocks = (count + block_size - 1) / block_size;
     keys_.resize(blocks * block_size);
     minima_.assign((blocks + block_size - 1) / block_size * block_size, taken);
-    taken_.resize(keys_.size());
+    taken_keys_.resize(keys_.size() + block_size, 0);
+    taken_places_.resize(keys_.size() + block_size);
     sorted_.resize(keys_.size());
     count_ = count;
   }
@@ -361,6 +372,7 @@ public:
 private:
   using Numbers = AlignedVector<std::int32_t>;
   static constexpr std::size_t some = 10;
+  static constexpr std::size_t four = 4;
 
   [[gnu::always_inline]] static std::int32_t smallest_of(const Numbers& numbers, std::size_t block) noexcept {
     Block<std::int32_t> here;
@@ -396,48 +408,61 @@ private:
       sort_taken();
     });
   }
+  /// Four at a time, whether there are so many or not: who would ask after each is told wrong too often.
   [[gnu::always_inline]] void take(std::size_t block, std::int32_t most) noexcept {
+    std::int32_t* const keys = keys_.data() + block * block_size;
     Block<std::int32_t> here;
-    load_block<std::int32_t>(keys_.data() + block * block_size, here);
-    for (unsigned mask = mask_below<std::int32_t>(here, most + 1); mask != 0; mask &= mask - 1) {
-      const std::size_t place = block * block_size + static_cast<std::size_t>(std::countr_zero(mask));
-      taken_[sorted_count_++] = {place, keys_[place]};
-      keys_[place] = taken;
-    }
-    minima_[block] = smallest_of(keys_, block);
+    load_block<std::int32_t>(keys, here);
+    const unsigned below = mask_below<std::int32_t>(here, most + 1);
+    std::size_t to = sorted_count_;
+    for (unsigned left = below; left != 0;)
+      for (std::size_t i = 0; i < four; ++i, ++to, left &= left - 1) {
+        const auto lane = static_cast<std::size_t>(std::countr_zero(left)) % block_size;
+        taken_keys_[to] = keys[lane];
+        taken_places_[to] = static_cast<std::uint32_t>(block * block_size + lane);
+      }
+    sorted_count_ += static_cast<std::size_t>(std::popcount(below));
+    here = here < Block<std::int32_t>{} + (most + 1) ? Block<std::int32_t>{} + taken : here;
+    std::memcpy(keys, &here, sizeof(here));
+    minima_[block] = smallest<std::int32_t>(here);
   }
   /// By counting for each who comes before it, sixteen at a time and without a branch: they are few.
   [[gnu::always_inline]] void sort_taken() noexcept {
     if (sorted_count_ > 16 * block_size) {
-      std::copy_n(taken_.begin(), sorted_count_, sorted_.begin());
+      for (std::size_t i = 0; i < sorted_count_; ++i) sorted_[i] = {taken_places_[i], taken_keys_[i]};
       const auto before = [](const Item& a, const Item& b) {
         return a.key != b.key ? a.key < b.key : a.place < b.place;
       };
       std::sort(sorted_.begin(), sorted_.begin() + static_cast<std::ptrdiff_t>(sorted_count_), before);
       return;
     }
+    Block<std::int32_t> numbers;
+    for (std::size_t i = 0; i < block_size; ++i) numbers[i] = static_cast<std::int32_t>(i);
     for (std::size_t begin = 0; begin < sorted_count_; begin += block_size) {
-      const std::size_t size = std::min(block_size, sorted_count_ - begin);
-      std::int32_t key[block_size] = {}, number[block_size] = {}, rank[block_size];
-      for (std::size_t i = 0; i < size; ++i) key[i] = taken_[begin + i].key;
-      for (std::size_t i = 0; i < block_size; ++i) number[i] = static_cast<std::int32_t>(begin + i);
-      Block<std::int32_t> keys, numbers, ranks{};
-      load_block<std::int32_t>(key, keys);
-      load_block<std::int32_t>(number, numbers);
-      for (std::size_t j = 0; j < sorted_count_; ++j) {
-        // Of equals the one that was taken out first, whose place is lower.
-        const Block<std::int32_t> later = numbers > Block<std::int32_t>{} + static_cast<std::int32_t>(j);
-        ranks -= Block<std::int32_t>{} + taken_[j].key < keys - later;
+      Block<std::int32_t> keys, ranks{};
+      load_block<std::int32_t>(taken_keys_.data() + begin, keys);
+      // Of equals the one that was taken out first, whose place is lower.
+      for (std::size_t j = 0; j < begin; ++j) ranks -= Block<std::int32_t>{} + taken_keys_[j] <= keys;
+      for (std::size_t j = begin; j < std::min(begin + block_size, sorted_count_); ++j) {
+        const Block<std::int32_t> later =
+            numbers > Block<std::int32_t>{} + static_cast<std::int32_t>(j - begin);
+        ranks -= Block<std::int32_t>{} + taken_keys_[j] < keys - later;
       }
+      for (std::size_t j = begin + block_size; j < sorted_count_; ++j)
+        ranks -= Block<std::int32_t>{} + taken_keys_[j] < keys;
+      std::int32_t rank[block_size];
       std::memcpy(rank, &ranks, sizeof(ranks));
-      for (std::size_t i = 0; i < size; ++i) sorted_[static_cast<std::size_t>(rank[i])] = taken_[begin + i];
+      const std::size_t size = std::min(block_size, sorted_count_ - begin);
+      for (std::size_t i = 0; i < size; ++i)
+        sorted_[static_cast<std::size_t>(rank[i])] = {taken_places_[begin + i], taken_keys_[begin + i]};
     }
   }
 
   std::size_t count_ = 0;
   Numbers keys_;
-  Numbers minima_;            ///< of sixteen keys each
-  std::vector<Item> taken_;   ///< by place
+  Numbers minima_;      ///< of sixteen keys each
+  Numbers taken_keys_;  ///< by place
+  AlignedVector<std::uint32_t> taken_places_;
   std::vector<Item> sorted_;  ///< the same by key
   std::size_t sorted_count_ = 0;
   std::size_t given_ = 0;  ///< of them
