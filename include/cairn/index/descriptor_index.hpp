@@ -42,6 +42,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -226,7 +227,7 @@ public:
       bytes_.resize(index.dimension());
       detail::copy_point<float>(query, row_.size(), row_.data(), {"DescriptorIndex: query", 0});
       const auto missed = index.scale_.encode(row_.data(), bytes_.data());
-      const auto exact = [&](PointId id) { return index.reduced_distance(row_.data(), id); };
+      const Exact exact{index, row_.data()};
       byte_doubts_.clear();
       detail::ByteOffer offer({index.dimension(), index.scale_.unit(), missed.rounding, index.error_,
                                index.inside_ ? missed.outside_squared : 0},
@@ -250,6 +251,14 @@ public:
 
 private:
   friend struct detail::DescriptorAccess;
+
+  /// Distances of the caller's points from a query.
+  struct Exact {
+    const DescriptorIndex& index;
+    const float* query;
+    [[nodiscard]] float operator()(PointId id) const { return index.reduced_distance(query, id); }
+    void prefetch(PointId id) const noexcept { index.prefetch_point(id); }
+  };
 
   DescriptorIndex(const Points* points, const DescriptorIndexOptions& options)
       : points_(points), options_(options) {}
@@ -333,6 +342,18 @@ private:
     const double share = coded() || codes_pay(size_) ? 3.5 : 5;
     return std::max<std::size_t>(2 * detail::block_size,
                                  static_cast<std::size_t>(std::sqrt(static_cast<double>(size_)) / share));
+  }
+
+  /// Asks for the coordinates of a point, where it has them in memory.
+  void prefetch_point(PointId id) const noexcept {
+    using Member = decltype((*points_)[id]);
+    constexpr bool stays =
+        std::is_lvalue_reference_v<Member> || std::ranges::enable_borrowed_range<std::remove_cv_t<Member>>;
+    if constexpr (stays && requires { *(*points_)[id].data(); }) {
+      const auto* first = (*points_)[id].data();
+      const std::size_t in_line = std::max<std::size_t>(1, 64 / sizeof(*first));
+      for (std::size_t axis = 0; axis < dimension(); axis += in_line) __builtin_prefetch(first + axis);
+    }
   }
 
   /// Sixteen sums side by side.

@@ -39,7 +39,7 @@ struct ByteDoubt {
   PointId id;
 };
 
-/// exact(id) is the reduced distance of a point from the query.
+/// exact(id) is the reduced distance of a point from the query, exact.prefetch(id) asks for what that takes.
 template <class Exact, class C>
 class ByteOffer {
 public:
@@ -52,7 +52,8 @@ public:
         slack_(accuracy.query_error + accuracy.point_error),
         likely_slack_(std::min(slack_, likely_slack(accuracy))),
         outside_squared_(0.999F * accuracy.outside_squared),
-        growth_(1.0001F + static_cast<float>(accuracy.dimension) * std::numeric_limits<float>::epsilon()) {
+        in_bytes_((1.0001F + static_cast<float>(accuracy.dimension) * std::numeric_limits<float>::epsilon()) /
+                  accuracy.unit) {
     tighten();
   }
 
@@ -69,19 +70,33 @@ public:
     if (distance < below_ && id != no_point) point(distance, id);
   }
 
-  void block(const std::int32_t* distances, const PointId* ids) {
-    unsigned mask = 0;
+  /// Asks for the coordinates of a point that one() may measure.
+  void prefetch(PointId id) const noexcept {
+    if (slack_ > 0 && id != no_point) exact_.prefetch(id);
+  }
+
+  /// Points of so many blocks, `most_blocks` at most.
+  void blocks(const std::int32_t* distances, const PointId* ids, std::size_t count) {
+    unsigned masks[most_blocks];
     const std::int32_t below = below_;
     with_widest_lanes([&]() CAIRN_INLINED {
-      Block<std::int32_t> numbers;
-      load_block<std::int32_t>(distances, numbers);
-      mask = mask_below<std::int32_t>(numbers, below);
+      for (std::size_t b = 0; b < count; ++b) {
+        Block<std::int32_t> numbers;
+        load_block<std::int32_t>(distances + b * block_size, numbers);
+        masks[b] = mask_below<std::int32_t>(numbers, below);
+      }
     });
-    for (; mask != 0; mask &= mask - 1) {
-      const auto lane = static_cast<unsigned>(std::countr_zero(mask));
-      if (distances[lane] < below_ && ids[lane] != no_point) point(distances[lane], ids[lane]);
-    }
+    const auto each = [&](const auto& visit) {
+      for (std::size_t b = 0; b < count; ++b)
+        for (unsigned mask = masks[b]; mask != 0; mask &= mask - 1) {
+          const std::size_t place = b * block_size + static_cast<std::size_t>(std::countr_zero(mask));
+          visit(distances[place], ids[place]);
+        }
+    };
+    if (slack_ > 0) each([this](std::int32_t, PointId id) { prefetch(id); });
+    each([this](std::int32_t distance, PointId id) { one(distance, id); });
   }
+  static constexpr std::size_t most_blocks = 8;
 
   /// Measures whoever is still possible: then nobody who was offered is left out.
   void settle() {
@@ -122,8 +137,8 @@ private:
 
   /// The collector's limit in the units of the bytes, and what rounding can hide.
   void tighten() {
-    const float distance = std::sqrt(static_cast<float>(collector_.limit())) / unit_ * growth_;
-    const float inside = std::sqrt(std::max(0.0F, distance * distance - outside_squared_));
+    float inside = std::sqrt(static_cast<float>(collector_.limit())) * in_bytes_;
+    if (outside_squared_ > 0) inside = std::sqrt(std::max(0.0F, inside * inside - outside_squared_));
     reach_ = inside + slack_;
     below_ = squared_up(reach_);
     if (slack_ > 0) likely_below_ = squared_up(inside + likely_slack_);
@@ -141,7 +156,7 @@ private:
   float slack_;            ///< how far the bytes of query and point together may be from them, in bytes
   float likely_slack_;     ///< and how far they are as a rule, at most
   float outside_squared_;  ///< what the query being outside of the box adds, squared, at least
-  float growth_;           ///< covers the rounding of sums
+  float in_bytes_;         ///< of a distance; covers the rounding of sums
   float reach_ = 0;
   std::int32_t below_ = 0;
   std::int32_t likely_below_ = 0;

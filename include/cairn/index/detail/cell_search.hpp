@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include <cairn/index/collectors.hpp>
@@ -83,9 +84,16 @@ private:
     std::int32_t distances[at_once * block_size];
     for (const std::size_t end = block + count; block < end;) {
       const std::size_t now = std::min(at_once, end - block);
+      const PointId* ids = cells.ids_of(block);
       cells.members().distances(block, now, query_, distances);
-      for (std::size_t i = 0; i < now; ++i, ++block)
-        offer.block(distances + i * block_size, cells.ids_of(block));
+      if (offer.unlimited()) {
+        for (std::size_t i = 0; i < now * block_size; ++i)
+          if (ids[i] == no_point) distances[i] = std::numeric_limits<std::int32_t>::max();
+        find_limit(distances, now, offer,
+                   [&](std::size_t i, std::int32_t nearest) { offer.one(nearest, ids[i]); });
+      }
+      offer.blocks(distances, ids, now);
+      block += now;
     }
   }
 
@@ -113,7 +121,11 @@ private:
       for (std::size_t place = end_of_points; place < (block + now) * block_size; ++place)
         estimates[place - block * block_size] = std::numeric_limits<float>::infinity();
       measure_pending(cells, offer);
-      if (offer.unlimited()) find_limit(cells, block, now, estimates, offer);
+      if (offer.unlimited())
+        find_limit(estimates, now, offer, [&](std::size_t i, float) {
+          pending_.push_back(static_cast<std::uint32_t>(block * block_size + i));
+          measure_pending(cells, offer);
+        });
       cells.codes().verdicts(block, now, estimates, limits_of(cells, cell.key, offer), verdicts);
       for (std::size_t i = 0; i < now; ++i, ++block) {
         ask_for(cells, block, verdicts[i].likely);
@@ -123,18 +135,18 @@ private:
     }
   }
 
-  /// Without a limit everyone is likely: the points with the smallest estimates give one.
-  template <class Offer>
-  void find_limit(const ByteCells& cells, std::size_t block, std::size_t count, float* estimates,
-                  Offer& offer) {
-    constexpr float done = std::numeric_limits<float>::infinity();
+  /// Without a limit everyone is likely: those with the smallest numbers give one, taken one by one. Whoever
+  /// is taken, or not there, has the largest number.
+  template <class Number, class Offer, class Take>
+  static void find_limit(Number* numbers, std::size_t count, const Offer& offer, const Take& take) {
+    constexpr Number done = std::numeric_limits<Number>::has_infinity
+                                ? std::numeric_limits<Number>::infinity()
+                                : std::numeric_limits<Number>::max();
     while (offer.unlimited()) {
-      const float* least = std::min_element(estimates, estimates + count * block_size);
+      Number* const least = std::min_element(numbers, numbers + count * block_size);
       if (*least == done) return;
-      const auto place = static_cast<std::size_t>(least - estimates);
-      estimates[place] = done;
-      pending_.push_back(static_cast<std::uint32_t>(block * block_size + place));
-      measure_pending(cells, offer);
+      const Number number = std::exchange(*least, done);
+      take(static_cast<std::size_t>(least - numbers), number);
     }
   }
 
@@ -179,6 +191,8 @@ private:
     distances_.resize(pending_.size());
     cells.rows().distances(pending_.data(), pending_.size(), query_, distances_.data());
     for (std::size_t i = 0; i < pending_.size(); ++i)
+      if (distances_[i] < offer.below()) offer.prefetch(cells.id_of(pending_[i]));
+    for (std::size_t i = 0; i < pending_.size(); ++i)
       if (distances_[i] < offer.below()) offer.one(distances_[i], cells.id_of(pending_[i]));
     pending_.clear();
   }
@@ -190,7 +204,7 @@ private:
     std::int32_t key;  ///< squared distance from the cell's mean
   };
 
-  static constexpr std::size_t at_once = 8;  ///< blocks whose estimates are made together
+  static constexpr std::size_t at_once = 8;  ///< blocks that are looked at together
   /// How many spreads an estimate may err to the one side before a point that is near is taken for far: 3
   /// leave out one of a thousand.
   static constexpr float likely_spreads = 3;
