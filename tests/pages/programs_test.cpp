@@ -51,6 +51,10 @@ std::string walk(double sigma) {
 
 TEST_SUITE_BEGIN("pages/programs");
 
+TEST_CASE("page of stereo_slam") {
+  check_page_of("stereo_slam", "--frames 6");
+}
+
 TEST_CASE("page of grid_slam") {
   check_page_of("grid_slam", "--simulate --particles 3 --seed 5");
 }
