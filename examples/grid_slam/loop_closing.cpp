@@ -41,6 +41,23 @@ private:
   std::vector<Vector<3>> moved_;
 };
 
+/// Of what all loops measure together, before they are seen: of the steps, and of each loop's own noise.
+Eigen::MatrixXd covariance_of_loops(const std::vector<Loop>& loops, const Linearised& at) {
+  const auto rows = static_cast<Eigen::Index>(3 * loops.size());
+  Eigen::MatrixXd matrix(rows, rows);
+  for (std::size_t i = 0; i < loops.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(3 * i);
+    for (std::size_t j = 0; j <= i; ++j) {
+      const Matrix<3> block = at.shared(loops[i], loops[j]);
+      const auto column = static_cast<Eigen::Index>(3 * j);
+      matrix.block<3, 3>(row, column) = block;
+      matrix.block<3, 3>(column, row) = block.transpose();
+    }
+    matrix.block<3, 3>(row, row) += loops[i].covariance;
+  }
+  return matrix;
+}
+
 /// Moves every step by what the loops over it ask: covariance times the sum of Ad_k^T Ad(last)^-T multiplier.
 void pull(StepChain& moved, const StepChain& chain, const std::vector<Loop>& loops, const Linearised& at,
           const Eigen::VectorXd& multiplier) {
@@ -95,7 +112,6 @@ std::vector<SE2> conditioned(const StepChain& chain, const std::vector<Loop>& lo
     const std::vector<SE2> poses = poses_of(moved);
     const Linearised at(chain, moved);
     Eigen::VectorXd error(rows);
-    Eigen::MatrixXd matrix(rows, rows);
     for (std::size_t i = 0; i < loops.size(); ++i) {
       const Loop& loop = loops[i];
       CAIRN_EXPECTS(loop.first < loop.last && loop.last < poses.size(),
@@ -103,15 +119,8 @@ std::vector<SE2> conditioned(const StepChain& chain, const std::vector<Loop>& lo
       const auto row = static_cast<Eigen::Index>(3 * i);
       const SE2 seen = poses[loop.first].inverse() * poses[loop.last];
       error.segment<3>(row) = cairn::local(seen, loop.T_first_last) + noise[i] + at.moved(loop);
-      for (std::size_t j = 0; j <= i; ++j) {
-        const Matrix<3> block = at.shared(loop, loops[j]);
-        const auto column = static_cast<Eigen::Index>(3 * j);
-        matrix.block<3, 3>(row, column) = block;
-        matrix.block<3, 3>(column, row) = block.transpose();
-      }
-      matrix.block<3, 3>(row, row) += loop.covariance;
     }
-    const cairn::Cholesky<cairn::dynamic> root(matrix);
+    const cairn::Cholesky<cairn::dynamic> root(covariance_of_loops(loops, at));
     if (!root.good()) return poses_of(chain);
     pull(moved, chain, loops, at, root.solve(error));
   }
@@ -127,6 +136,30 @@ StepChain drawn_steps(const std::vector<cairn::PathPose<SE2>>& path) {
     chain.covariances.push_back(path[k].drawn_from.covariance + least);
   }
   return chain;
+}
+
+Matrix<3> covariance_of_end(const std::vector<cairn::PathPose<SE2>>& path, const std::vector<Loop>& loops) {
+  CAIRN_EXPECTS(!path.empty(), "covariance_of_end needs a path");
+  if (path.size() == 1) return Matrix<3>::Zero();
+  const StepChain drawn = drawn_steps(path);
+  StepChain moved = drawn;
+  for (std::size_t k = 0; k < moved.steps.size(); ++k)
+    moved.steps[k] = path[k].pose.inverse() * path[k + 1].pose;
+  const Linearised at(drawn, moved);
+  const Loop whole{0, drawn.steps.size(), {}, Matrix<3>::Zero()};
+  const Matrix<3> prior = at.shared(whole, whole);
+  if (loops.empty()) return prior;
+  const cairn::Cholesky<cairn::dynamic> root(covariance_of_loops(loops, at));
+  if (!root.good()) return prior;
+  Eigen::MatrixXd seen(static_cast<Eigen::Index>(3 * loops.size()), 3);
+  for (std::size_t i = 0; i < loops.size(); ++i)
+    seen.block<3, 3>(static_cast<Eigen::Index>(3 * i), 0) = at.shared(loops[i], whole);
+  Matrix<3> told = Matrix<3>::Zero();
+  for (int axis = 0; axis < 3; ++axis) {
+    const Eigen::VectorXd column = seen.col(axis);
+    told.col(axis) = seen.transpose() * root.solve(column);
+  }
+  return cairn::symmetrised(Matrix<3>(prior - told));
 }
 
 std::vector<cairn::PathPose<SE2>> moved_by(std::vector<cairn::PathPose<SE2>> path,

@@ -73,6 +73,11 @@ private:
 /// The steps of a particle's path as they were drawn, with the covariances of what they were drawn from.
 [[nodiscard]] StepChain drawn_steps(const std::vector<cairn::PathPose<cairn::SE2>>& path);
 
+/// Covariance of a path's last pose, seen from its first, by the steps as they were drawn and given the
+/// loops; on the right of the last pose.
+[[nodiscard]] cairn::Matrix<3> covariance_of_end(const std::vector<cairn::PathPose<cairn::SE2>>& path,
+                                                 const std::vector<Loop>& loops);
+
 /// The path given the loops, with a noise drawn for each of them. It begins from the steps as they were
 /// drawn, whatever has moved the path since: so no loop counts twice, and a path that is moved again is as
 /// likely to go there as to come back (the move keeps the posterior, in detailed balance).

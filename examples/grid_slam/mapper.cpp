@@ -104,6 +104,12 @@ const Mapper::Belief& Mapper::belief() const {
   return *belief_;
 }
 
+cairn::Gaussian<SE2> Mapper::newest() const {
+  cairn::Gaussian<SE2> pose = belief().pose();
+  if (!frozen_) pose.covariance += covariance_of_end(belief_->path(belief_->best()), loops_);
+  return pose;
+}
+
 bool Mapper::add(const cairn::StampedScan& scan) {
   bool due = scans_.empty();
   if (due) {

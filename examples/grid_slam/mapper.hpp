@@ -154,6 +154,10 @@ public:
   [[nodiscard]] const std::vector<Loop>& loops() const noexcept { return loops_; }
   /// Of a mapper that has taken a scan.
   [[nodiscard]] const Belief& belief() const;
+  /// The newest pose, seen from where the map begins. To the spread of the particles, whose ancestors are one
+  /// soon, comes what the path of the best of them has gathered, step by step, since it began, and what loops
+  /// have told of it since. In a map that stays as it is, the particles' spread is all there is. O(steps).
+  [[nodiscard]] cairn::Gaussian<cairn::SE2> newest() const;
   /// How far scans lag behind odometry, as far as turns have shown.
   [[nodiscard]] const ScanDelay& delay() const noexcept { return delay_; }
   /// Of a localiser with a window that has taken a scan: the place where it began, then those that look like

@@ -44,7 +44,7 @@ Results run(Mapper& mapper, const cairn::CarmenLog& log, const std::vector<cairn
   r.odometry = odometry_from(r.drawn.front().pose, mapper.scans());
   r.means = mapper.trajectory(true);
   r.rematched = mapper.rematched();
-  r.newest = mapper.belief().pose();
+  r.newest = mapper.newest();
   r.delay = mapper.delay().mean();
   r.delay_spread = mapper.delay().spread();
   r.map = map_image(mapper.belief()[mapper.belief().best()].map.grid);

@@ -1,0 +1,87 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+#include <doctest/doctest.h>
+
+#include <cairn/core/cholesky.hpp>
+#include <cairn/core/statistics.hpp>
+#include <cairn/filter/gaussian.hpp>
+
+#include "floor_plan.hpp"
+#include "mapper.hpp"
+
+namespace newest_pose_test {
+namespace {
+
+using namespace cairn;
+using namespace grid_slam;
+
+/// A mapper that has taken `count` scans of a drive, each seen `late` scans before odometry was where it is,
+/// and where the laser was at the last one, seen from the first.
+struct Driven {
+  Mapper mapper;
+  SE2 truth;
+};
+
+Driven driven(std::uint64_t seed, std::size_t count, std::size_t late) {
+  const Drive drive = simulated_drive({.seed = seed});
+  Driven d{Mapper({.start = SE2(), .particles = 8, .seed = seed, .threads = 2}), {}};
+  for (std::size_t i = late; i < count; ++i) {
+    StampedScan scan = drive.log.scans[i];
+    scan.scan = drive.log.scans[i - late].scan;
+    // What belongs to the newest processed scan is asked then.
+    if (d.mapper.add(scan)) d.truth = drive.truth.front().inverse() * drive.truth[i - late];
+  }
+  return d;
+}
+
+double squared_distance(const Gaussian<SE2>& pose, const SE2& truth) {
+  const Cholesky<3> root(pose.covariance);
+  REQUIRE(root.good());
+  return root.whiten(local(pose.mean, truth)).squaredNorm();
+}
+
+}  // namespace
+
+TEST_SUITE("grid_slam/newest_pose") {
+  TEST_CASE("newest_pose: the truth is in its spread, whether scans are in time or late") {
+    constexpr int drives = 5;
+    for (const std::size_t late : {std::size_t{0}, std::size_t{1}}) {
+      CAPTURE(late);
+      double told = 0, by_particles = 0;
+      for (std::uint64_t seed = 1; seed <= drives; ++seed) {
+        const Driven d = driven(seed, 280, late);
+        CHECK(std::abs(d.mapper.delay().mean() - static_cast<double>(late)) < 0.3);
+        told += squared_distance(d.mapper.newest(), d.truth) / drives;
+        by_particles += squared_distance(d.mapper.belief().pose(), d.truth) / drives;
+      }
+      CAPTURE(told);
+      CAPTURE(by_particles);
+      // The mean of five chi-squares of three degrees of freedom is below this 995 times of 1000. It is
+      // below 1, for the steps' errors are not as independent as they are taken to be: each is matched to
+      // the map that the ones before have made.
+      const double most = chi_square_quantile(0.995, 3 * drives) / drives;
+      CHECK(told < most);
+      CHECK(told > 0.05);
+      // What the particles alone say is far too sure: they have one ancestor.
+      CHECK(by_particles > most);
+    }
+  }
+
+  TEST_CASE("newest_pose: a closed loop takes back what the lap has gathered") {
+    const std::size_t all = simulated_drive({.seed = 1}).log.scans.size();
+    const auto width = [](const Driven& d) {
+      return d.mapper.newest().covariance.topLeftCorner<2, 2>().trace();
+    };
+    const Driven before = driven(1, 3 * all / 4, 0), after = driven(1, all, 0);
+    REQUIRE(before.mapper.loops().empty());
+    REQUIRE(!after.mapper.loops().empty());
+    CHECK(width(after) < 0.25 * width(before));
+    CHECK(squared_distance(after.mapper.newest(), after.truth) < chi_square_quantile(0.995, 3));
+  }
+}
+
+}  // namespace newest_pose_test
