@@ -3,7 +3,8 @@
 //
 // The scoreboard of grid mapping: scripts/scoreboard grid_slam. Five seeds of three published logs, one
 // setting for all: about twenty minutes. The rivals' figures were measured on the same logs by the same
-// metric, with the scans between processed ones filled along odometry.
+// metric, with the scans between processed ones filled along odometry; where their folders are given, they
+// are measured anew.
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -23,7 +24,9 @@
 #include <cairn/eval/relations.hpp>
 #include <cairn/io/carmen.hpp>
 
+#include "filled_path.hpp"
 #include "floor_plan.hpp"
+#include "rivals.hpp"
 #include "run.hpp"
 #include "stop_mapper.hpp"
 #include "support/data.hpp"
@@ -88,11 +91,58 @@ double worst(const std::vector<double>& values) {
   return *std::ranges::max_element(values);
 }
 
+/// A rival's runs, of one seed where it draws nothing; empty where it was not built in.
+struct RivalRuns {
+  std::string name;
+  std::vector<double> mean{}, angle{}, largest{}, milliseconds{};
+
+  void add(const cairn::CarmenLog& log, const grid_slam_bench::RivalPath& path,
+           const std::vector<cairn::PoseRelation>& relations) {
+    const auto poses = grid_slam::filled_path(
+        log.scans, path.poses.size(), [&](std::size_t k) { return path.processed[k]; },
+        [&](std::size_t k) { return path.poses[k]; });
+    const cairn::RelationError error = cairn::relation_error(poses, relations);
+    mean.push_back(error.mean);
+    angle.push_back(error.mean_angle * degrees);
+    largest.push_back(error.largest);
+    milliseconds.push_back(1e3 * path.cpu_seconds / static_cast<double>(path.poses.size()));
+    std::cerr << name << ": " << error.mean << " m, largest " << error.largest << " m\n";
+  }
+};
+
+std::vector<RivalRuns> rivals_of(const cairn::CarmenLog& log,
+                                 const std::vector<cairn::PoseRelation>& relations) {
+  constexpr std::uint64_t rival_seeds = 3;  // GMapping takes one to two minutes for each
+  RivalRuns filter{.name = "GMapping"}, graph{.name = "open_karto"};
+  for (std::uint64_t seed = 1; seed <= rival_seeds; ++seed)
+    if (const auto path = grid_slam_bench::gmapping(log, seed)) filter.add(log, *path, relations);
+  if (const auto path = grid_slam_bench::open_karto(log)) graph.add(log, *path, relations);
+  std::vector<RivalRuns> all{filter, graph};
+  std::erase_if(all, [](const RivalRuns& r) { return r.mean.empty(); });
+  return all;
+}
+
+void add_rival_rows(Scoreboard& board, const std::string& title, const std::vector<RivalRuns>& rivals) {
+  for (const RivalRuns& r : rivals)
+    board.add({.name = title + " by " + r.name + ", its defaults: mean of relations, median of " +
+                       std::to_string(r.mean.size()),
+               .measured = median(r.mean),
+               .unit = "m",
+               .rival_name = "a rival's own row",
+               .note = "worst " + std::to_string(worst(r.mean)) + " m, " + std::to_string(median(r.angle)) +
+                       " deg, largest " + std::to_string(worst(r.largest)) + " m, CPU " +
+                       std::to_string(median(r.milliseconds)) + " ms a processed scan"});
+}
+
 void add_rows(Scoreboard& board, const Figures& f, const std::optional<std::filesystem::path>& folder) {
   std::optional<Runs> runs;
+  std::vector<RivalRuns> rivals;
   if (folder)
-    if (const auto log = unpacked(*folder / (f.log + ".clf.bz2")))
-      runs = runs_of(*log, cairn::read_relations(*folder / (f.log + ".relations")));
+    if (const auto log = unpacked(*folder / (f.log + ".clf.bz2"))) {
+      const auto relations = cairn::read_relations(*folder / (f.log + ".relations"));
+      runs = runs_of(*log, relations);
+      rivals = rivals_of(*log, relations);
+    }
   const auto row = [&](const std::string& name, const char* unit, std::optional<double> must,
                        std::optional<double> aim, const auto& value) {
     Row r{.name = f.title + ": " + name, .unit = unit, .must = must, .aim = aim, .rival_name = "no rival"};
@@ -107,6 +157,7 @@ void add_rows(Scoreboard& board, const Figures& f, const std::optional<std::file
   mean.rival = f.rival;
   mean.rival_name = f.rival_name;
   board.add(mean);
+  add_rival_rows(board, f.title, rivals);
   board.add(row("the same, worst seed", "m", f.log == "aces" ? std::optional(0.055) : std::nullopt, {},
                 [](const Runs& r) { return worst(r.mean); }));
   board.add(row("mean angle, median", "deg", f.must_angle, f.aim_angle,
