@@ -10,11 +10,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include <cairn/core/check.hpp>
+
+#include "surface_patch.hpp"
 
 namespace stereo_slam {
 
@@ -25,8 +28,9 @@ struct Landmark {
   std::vector<float> descriptor;
   std::int8_t sign = 0;  ///< of the Laplacian: -1 bright, +1 dark
   std::uint8_t grey = 0;
-  int first_seen = 0;  ///< step
-  int last_seen = 0;   ///< step
+  std::shared_ptr<const SurfacePatch> patch;  ///< what it looked like when it was first seen
+  int first_seen = 0;                         ///< step
+  int last_seen = 0;                          ///< step
   int sightings = 1;
   int expected = 1;  ///< frames in which it was seen or should have been
 };

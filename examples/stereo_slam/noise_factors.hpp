@@ -19,13 +19,13 @@ namespace stereo_slam {
 ///
 /// Poses, for what is reported: the cluster-robust score variance of MapLocation, widened. What neighbours in
 /// the image have in common shows in it; what the whole image has in common the pose has absorbed, such as
-/// blobs on a floor that all wander the same way as the camera comes nearer. Measured on the rendered arena,
-/// where the truth is known, the variance of poses is 1.5 times what they say on the spot, and about six
-/// where the viewpoint changes (by 2 % of the distance and more between keyframes).
+/// what a surface that is no plane does to all patches as the camera comes nearer. Measured on the rendered
+/// arena, where the truth is known, the variance of poses is 1.5 times what they say on the spot, and about
+/// 2.5 where the viewpoint changes (by 2 % of the distance and more between keyframes).
 class NoiseFactors {
 public:
   /// What the factor of poses comes to where the camera moves.
-  static constexpr double moving = 6;
+  static constexpr double moving = 2.5;
 
   NoiseFactors() = default;
   /// Goes on from factors that were found before.

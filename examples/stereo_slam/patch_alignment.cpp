@@ -171,6 +171,8 @@ std::optional<PatchAlignment> align_patch(cairn::ImageView left, float left_x, f
     PatchAlignment result;
     result.x = right_x + warp(0);
     result.y = right_y + warp(1);
+    result.stretch = warp(2) / patch_half;
+    result.shear = warp(3) / patch_half;
     result.sigma = std::sqrt(squares / (patch_pixels - 6) * column(0));
     result.correlation = 1 - 0.5F * squares / (reference->norm * reference->norm);
     return result;

@@ -19,6 +19,8 @@ namespace stereo_slam {
 struct PatchAlignment {
   float x = 0;  ///< where the patch centre lies in the other image [pixels]
   float y = 0;
+  float stretch = 0;      ///< a: by how much columns lie farther apart there
+  float shear = 0;        ///< b: how much farther right each row lies than the one above
   float sigma = 0;        ///< standard deviation of x that the residual and the gradients imply [pixels]
   float correlation = 0;  ///< normalised cross-correlation of the two patches, at most 1
 };

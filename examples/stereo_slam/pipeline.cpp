@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 #include <tuple>
 #include <utility>
 
@@ -160,6 +161,7 @@ void Pipeline::work_on(const StereoFrame& frame, const FramePoints& points, Fram
   result.index = frame.index;
   result.time = frame.time;
   left_ = &points.left;
+  image_ = frame.left;
   timed(result, Stage::total, [&] {
     timed(result, Stage::stereo, [&] {
       find_local_landmarks(points.matched_by == match_stereo_ ? points.pairs : pairs_of(frame, points));
@@ -302,7 +304,7 @@ void Pipeline::find_local_landmarks(std::span<const PointPair> pairs) {
     const double scale = left_->keypoints[pair.left].scale;
     const double sigma = options_.pixel_sigma * std::pow(scale, options_.scale_exponent);
     if (!triangulate_(pair.left_pixel, pair.right_pixel, sigma, sigma).good()) continue;
-    locals_.push_back({pair.left, pair.left_pixel, pair.right_pixel, sigma});
+    locals_.push_back({pair.left, pair.left_pixel, pair.right_pixel, sigma, pair});
   }
 }
 
@@ -344,6 +346,7 @@ std::optional<Pipeline::Located> Pipeline::locate(std::vector<Match>& matches) {
   if (!pose.good()) return std::nullopt;
   expected_.clear();
   if_time(Shed::second_look, [&] { look_again(pose, matches); });
+  settle(pose, matches);
   Located located;
   located.sightings = sightings(matches);
   located.location = map_.locate(pose.T_world_camera, located.sightings);
@@ -382,6 +385,29 @@ std::vector<Pipeline::Match> Pipeline::within_reach(const std::vector<Match>& ma
     if (root.good() && root.whiten(off).squaredNorm() < gate) near.push_back(match);
   }
   return near;
+}
+
+/// Local landmarks move to where what their landmark looked like at first is now.
+void Pipeline::settle(const cairn::StereoPose& pose, const std::vector<Match>& matches) {
+  const cairn::SE3 T_camera_world = pose.T_world_camera.inverse();
+  for (const Match& match : matches) {
+    LocalLandmark& local = locals_[match.local];
+    const std::shared_ptr<const SurfacePatch>& patch = landmarks_[match.landmark].patch;
+    if (!patch || !local.pair.refined) continue;
+    local.sigma *= std::numbers::sqrt2;  // the landmark's own place is that of its patch
+    const auto T_world_then = map_.keyframe_pose(patch->keyframe);
+    const auto landmark = map_.landmark(match.landmark);
+    if (!T_world_then || !landmark) continue;
+    const double depth = (T_world_then->inverse() * landmark->mean)(2);
+    if (!(depth > 0)) continue;
+    const auto found =
+        find_patch(*patch, rig_.left, T_camera_world * *T_world_then, 1 / depth, image_, local.left_pixel);
+    if (!found || found->correlation < options_.stereo.min_correlation) continue;
+    const cairn::Vector<2> step = found->pixel - local.left_pixel;
+    local.left_pixel = found->pixel;
+    local.right_pixel += local.pair.right_step(step);
+    local.sigma = std::hypot(options_.patch_sigma, found->sigma);
+  }
 }
 
 /// Landmarks that the keyframes in play saw, and no local one is taken for yet, are searched for where the
@@ -461,6 +487,11 @@ void Pipeline::add_landmarks(const std::vector<Match>& known, const StereoFrame&
     const cairn::Keypoint& point = left_->keypoints[locals_[i].point];
     const std::span<const float> look = left_->descriptor(locals_[i].point);
     Landmark landmark;
+    if (locals_[i].pair.refined)
+      if (auto patch = SurfacePatch::of(frame.left, locals_[i].left_pixel, locals_[i].pair.slope,
+                                        map_.keyframes_added() - 1))
+        landmark.patch = std::make_shared<const SurfacePatch>(*patch);
+    if (landmark.patch) locals_[i].sigma = options_.patch_sigma;
     landmark.id = store_->add({look, point.laplacian});
     if (!map_.add_landmark(sighting(i, landmark.id))) {
       store_->erase(landmark.id);

@@ -78,7 +78,8 @@ struct PipelineOptions {
 
   double pixel_sigma = 0.35;     ///< noise of the coordinates of a point of scale 1 [pixels]
   double scale_exponent = 0.65;  ///< it grows with this power of the scale
-  FrameBudgetOptions budget;     ///< of the work on a frame; what it leaves out depends on the clock
+  double patch_sigma = 0.05;  ///< of a point whose patch was found again, besides what its residual implies
+  FrameBudgetOptions budget;  ///< of the work on a frame; what it leaves out depends on the clock
   GuidedMatchingOptions second_look;
   std::size_t min_inliers = 10;         ///< fewer: the frame is lost
   std::size_t relocating_inliers = 25;  ///< fewer: a camera that is lost stays so
@@ -139,7 +140,8 @@ private:
   struct LocalLandmark {
     std::uint32_t point;  ///< of the left image
     cairn::Vector<2> left_pixel, right_pixel;
-    double sigma;  ///< of each pixel coordinate
+    double sigma;    ///< of each pixel coordinate
+    PointPair pair;  ///< the pair that it is of
   };
   /// A local landmark and the landmark of the map it is taken for.
   struct Match {
@@ -185,6 +187,7 @@ private:
   void take_rig(const cairn::StereoRig& rig);
   void look_through(const cairn::StereoRig& rig);
 
+  void settle(const cairn::StereoPose& pose, const std::vector<Match>& matches);
   void look_again(const cairn::StereoPose& pose, std::vector<Match>& matches);
   void earliest_first(std::vector<Match>& matches) const;
   [[nodiscard]] std::vector<cairn::StereoMatch> observations(std::vector<Match>& matches);
@@ -199,6 +202,7 @@ private:
   cairn::StereoRig rig_;
   std::optional<FrontEnd> front_end_;      // made for the first frame that comes without points
   const cairn::Features* left_ = nullptr;  // of the frame that is worked on
+  cairn::ImageView image_;                 // its left image
   std::shared_ptr<const StereoMatcher> match_stereo_;
   cairn::Triangulator triangulate_;
   SelfCalibration calibration_;

@@ -5,8 +5,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include <cairn/core/check.hpp>
 #include <cairn/io/binary_file.hpp>
@@ -17,18 +20,51 @@ namespace stereo_slam {
 namespace {
 
 constexpr const char* file_kind = "cairnmap";
-constexpr std::uint64_t version = 2;  // 1 had five numbers of the rig
+constexpr std::uint64_t version = 3;  // 1 had five numbers of the rig, 2 no patches
 
-void put(cairn::BinaryWriter& out, const Landmark& landmark) {
+/// The numbers that the keyframes go by in a file, where those that left are not counted.
+std::vector<std::optional<std::uint32_t>> numbers_in_file(const cairn::KeyframeMap& map) {
+  std::vector<std::optional<std::uint32_t>> numbers(map.keyframes_added());
+  std::uint32_t next = 0;
+  for (std::size_t k = 0; k < numbers.size(); ++k)
+    if (map.keyframe_pose(k)) numbers[k] = next++;
+  return numbers;
+}
+
+void put(cairn::BinaryWriter& out, const SurfacePatch& patch, std::uint32_t keyframe) {
+  out.put(keyframe);
+  for (const cairn::Vector<2>* const vector : {&patch.pixel, &patch.slope})
+    for (int i = 0; i < 2; ++i) out.put((*vector)(i));
+  for (const std::uint8_t grey : patch.grey) out.put(grey);
+}
+
+SurfacePatch get_patch(cairn::BinaryReader& in, const cairn::KeyframeMap& map) {
+  SurfacePatch patch;
+  patch.keyframe = in.get<std::uint32_t>();
+  for (cairn::Vector<2>* const vector : {&patch.pixel, &patch.slope})
+    for (int i = 0; i < 2; ++i) (*vector)(i) = in.get<double>();
+  for (std::uint8_t& grey : patch.grey) grey = in.get<std::uint8_t>();
+  if (!map.keyframe_pose(patch.keyframe)) cairn::raise(in.name() + ": a patch is of no keyframe");
+  if (!map.nominal_rig().left.contains(patch.pixel) || !patch.slope.allFinite())
+    cairn::raise(in.name() + ": a patch is not in its image");
+  return patch;
+}
+
+void put(cairn::BinaryWriter& out, const Landmark& landmark,
+         const std::vector<std::optional<std::uint32_t>>& keyframes) {
+  const bool has_patch = landmark.patch && keyframes.at(landmark.patch->keyframe);
+  out.put(static_cast<std::uint8_t>(has_patch));
+  if (has_patch) put(out, *landmark.patch, *keyframes[landmark.patch->keyframe]);
   out.put(landmark.sign);
   out.put(landmark.grey);
   for (const int number : {landmark.first_seen, landmark.last_seen, landmark.sightings}) out.put(number);
   for (const float number : landmark.descriptor) out.put(number);
 }
 
-Landmark get_landmark(cairn::BinaryReader& in, LandmarkId id, int dimension) {
+Landmark get_landmark(cairn::BinaryReader& in, LandmarkId id, int dimension, const cairn::KeyframeMap& map) {
   Landmark landmark;
   landmark.id = id;
+  if (in.get<std::uint8_t>() != 0) landmark.patch = std::make_shared<const SurfacePatch>(get_patch(in, map));
   landmark.sign = in.get<std::int8_t>();
   landmark.grey = in.get<std::uint8_t>();
   for (int* number : {&landmark.first_seen, &landmark.last_seen, &landmark.sightings})
@@ -54,7 +90,8 @@ void save_map(const std::filesystem::path& path, const SavedMap& saved) {
   out.put(static_cast<std::uint8_t>(saved.oriented));
   out.put(saved.steps);
   cairn::save_keyframe_map(out, saved.map);
-  for (const Landmark& landmark : saved.landmarks) put(out, landmark);
+  const auto keyframes = numbers_in_file(saved.map);
+  for (const Landmark& landmark : saved.landmarks) put(out, landmark, keyframes);
   cairn::write_file_atomically(path, out.file(file_kind, version));
 }
 
@@ -68,7 +105,8 @@ SavedMap load_map(const std::filesystem::path& path) {
   SavedMap saved{static_cast<FeatureKind>(features), oriented, steps, cairn::load_keyframe_map(in), {}};
   const std::size_t count = saved.map.landmark_count();
   for (std::size_t i = 0; i < count; ++i)
-    saved.landmarks.push_back(get_landmark(in, static_cast<LandmarkId>(i), dimension_of(saved.features)));
+    saved.landmarks.push_back(
+        get_landmark(in, static_cast<LandmarkId>(i), dimension_of(saved.features), saved.map));
   in.expect_end();
   return saved;
 }

@@ -40,6 +40,15 @@ struct PointPair {
   cairn::Vector<2> left_pixel;
   cairn::Vector<2> right_pixel;  ///< refined
   bool refined = false;
+  /// Of a refined one: where the partner moves with the left point, right(u) = u + stretch u + shear v, and
+  /// by what part of itself the inverse depth of the surface grows from pixel to pixel of the left image.
+  float stretch = 0, shear = 0;
+  cairn::Vector<2> slope = cairn::Vector<2>::Zero();
+
+  /// Where the partner moves when the left point moves a little.
+  [[nodiscard]] cairn::Vector<2> right_step(const cairn::Vector<2>& left_step) const noexcept {
+    return {left_step(0) + stretch * left_step(0) + shear * left_step(1), left_step(1)};
+  }
 };
 
 /// Matches points of one rig. operator() is safe to call concurrently.
@@ -66,6 +75,7 @@ private:
   [[nodiscard]] Nearest nearest(const cairn::Features& left, const cairn::Features& right,
                                 unsigned threads) const;
   void refine(PointPair& match, cairn::ImageView left, cairn::ImageView right) const;
+  [[nodiscard]] cairn::Vector<2> slope_of_inverse_depth(const PointPair& match) const;
 
   cairn::StereoRig rig_;
   StereoMatcherOptions options_;

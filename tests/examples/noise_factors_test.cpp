@@ -22,7 +22,7 @@ TEST_SUITE("noise_factors") {
     frame.viewpoint_change = 0.5;
     for (int i = 0; i < 1000; ++i) bad.observe(frame);
     CHECK(bad.pixels() == doctest::Approx(4).epsilon(0.05));
-    CHECK(bad.poses() == doctest::Approx(18).epsilon(0.05));
+    CHECK(bad.poses() == doctest::Approx(7.5).epsilon(0.05));
   }
 }
 

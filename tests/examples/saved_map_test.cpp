@@ -3,6 +3,8 @@
 #include "saved_map.hpp"
 
 #include <cstddef>
+#include <cstdint>
+#include <memory>
 #include <string>
 
 #include <doctest/doctest.h>
@@ -33,6 +35,12 @@ SavedMap map_of_a_frame() {
     landmark.first_seen = 3;
     landmark.last_seen = 4;
     landmark.sightings = 2;
+    if (s.landmark % 2 == 0) {
+      stereo_slam::SurfacePatch patch{s.left, {0.01, -0.02}, 0, {}};
+      patch.grey.fill(static_cast<std::uint8_t>(s.landmark));
+      patch.grey[3] = 7;
+      landmark.patch = std::make_shared<const stereo_slam::SurfacePatch>(patch);
+    }
     saved.landmarks.push_back(landmark);
   }
   return saved;
@@ -58,6 +66,13 @@ TEST_SUITE("saved_map") {
       CHECK(is.descriptor == was.descriptor);
       CHECK(is.sign == was.sign);
       CHECK(is.grey == was.grey);
+      REQUIRE(static_cast<bool>(is.patch) == static_cast<bool>(was.patch));
+      if (was.patch) {
+        CHECK(is.patch->pixel == was.patch->pixel);
+        CHECK(is.patch->slope == was.patch->slope);
+        CHECK(is.patch->grey == was.patch->grey);
+        CHECK(is.patch->keyframe == 0);
+      }
       CHECK(is.first_seen == was.first_seen);
       CHECK(is.last_seen == was.last_seen);
       CHECK(is.sightings == was.sightings);
