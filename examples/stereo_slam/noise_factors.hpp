@@ -24,9 +24,6 @@ namespace stereo_slam {
 /// 2.5 where the viewpoint changes (by 2 % of the distance and more between keyframes).
 class NoiseFactors {
 public:
-  /// What the factor of poses comes to where the camera moves.
-  static constexpr double moving = 2.5;
-
   NoiseFactors() = default;
   /// Goes on from factors that were found before.
   NoiseFactors(double pixels, double poses) : pixels_(given * pixels), poses_(given * poses) {}
@@ -47,7 +44,7 @@ private:
   static constexpr double given = 5;  // frames that the sigma given is worth
   /// Variance of a pose over what the scores say.
   [[nodiscard]] static double unseen(double viewpoint_change) noexcept {
-    constexpr double on_the_spot = 1.5, change = 0.02;
+    constexpr double on_the_spot = 1.5, moving = 2.5, change = 0.02;
     const double x = viewpoint_change / change;
     return on_the_spot + (moving - on_the_spot) * x * x / (1 + x * x);
   }

@@ -228,9 +228,10 @@ void Pipeline::choose_calibration() {
   }
   if (!record.on || options_.calibrate == Calibration::drifting) return;
   cairn::KeyframeMapOptions with_rig = map_options(options_);
-  // The map takes pixels for independent and multiplies its covariances by how much they are not. What is
-  // known beforehand of the rig is put on the same scale.
-  with_rig.rig = options_.rig.scaled(1 / std::sqrt(NoiseFactors::moving));
+  // The map takes pixels for independent and multiplies its covariances by how much they are not: by 6 to 11
+  // on recorded drives. What is known beforehand of the rig is put on the same scale.
+  constexpr double variance_in_common = 6;
+  with_rig.rig = options_.rig.scaled(1 / std::sqrt(variance_in_common));
   map_ = cairn::KeyframeMap(rig_, with_rig);
 }
 
@@ -393,8 +394,9 @@ void Pipeline::settle(const cairn::StereoPose& pose, const std::vector<Match>& m
   for (const Match& match : matches) {
     LocalLandmark& local = locals_[match.local];
     const std::shared_ptr<const SurfacePatch>& patch = landmarks_[match.landmark].patch;
-    if (!patch || !local.pair.refined) continue;
+    if (!patch) continue;
     local.sigma *= std::numbers::sqrt2;  // the landmark's own place is that of its patch
+    if (!local.pair.refined) continue;
     const auto T_world_then = map_.keyframe_pose(patch->keyframe);
     const auto landmark = map_.landmark(match.landmark);
     if (!T_world_then || !landmark) continue;
