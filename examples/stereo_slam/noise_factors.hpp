@@ -21,12 +21,20 @@ namespace stereo_slam {
 /// the image have in common shows in it; what the whole image has in common the pose has absorbed, such as
 /// what a surface that is no plane does to all patches as the camera comes nearer. Measured on the rendered
 /// arena, where the truth is known, the variance of poses is 1.5 times what they say on the spot, and about
-/// 2.5 where the viewpoint changes (by 2 % of the distance and more between keyframes).
+/// 2.5 where the viewpoint changes (by 2 % of the distance and more between keyframes). A rig that has to be
+/// estimated goes without patches, and keypoints of a surface all wander the same way as the camera comes
+/// nearer: 6.
 class NoiseFactors {
 public:
+  /// What the factor of poses comes to where the camera moves.
+  static constexpr double exact_rig = 2.5, estimated_rig = 6;
+
   NoiseFactors() = default;
   /// Goes on from factors that were found before.
   NoiseFactors(double pixels, double poses) : pixels_(given * pixels), poses_(given * poses) {}
+
+  /// From now on the rig is estimated.
+  void estimate_rig() noexcept { moving_ = estimated_rig; }
 
   /// Takes a frame; returns its median chi^2 over what it should be.
   double observe(const cairn::MapLocation& frame) {
@@ -43,12 +51,13 @@ public:
 private:
   static constexpr double given = 5;  // frames that the sigma given is worth
   /// Variance of a pose over what the scores say.
-  [[nodiscard]] static double unseen(double viewpoint_change) noexcept {
-    constexpr double on_the_spot = 1.5, moving = 2.5, change = 0.02;
+  [[nodiscard]] double unseen(double viewpoint_change) const noexcept {
+    constexpr double on_the_spot = 1.5, change = 0.02;
     const double x = viewpoint_change / change;
-    return on_the_spot + (moving - on_the_spot) * x * x / (1 + x * x);
+    return on_the_spot + (moving_ - on_the_spot) * x * x / (1 + x * x);
   }
 
+  double moving_ = exact_rig;
   double median_ = cairn::chi_square_quantile(0.5, 4);
   double pixels_ = given, poses_ = given, count_ = given;
 };

@@ -87,6 +87,7 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options, 
     cairn::raise(name + ": this map estimates its rig, which cannot be followed as drifting besides");
   map_ = std::move(known.map);
   noise_factors_ = NoiseFactors(map_.pixel_factor(), map_.pose_factor());
+  if (map_.rig_correction()) noise_factors_.estimate_rig();
   step_ = known.steps;
   for (Landmark& landmark : known.landmarks) {
     landmark.id = store_->add({landmark.descriptor, landmark.sign});
@@ -228,10 +229,10 @@ void Pipeline::choose_calibration() {
   }
   if (!record.on || options_.calibrate == Calibration::drifting) return;
   cairn::KeyframeMapOptions with_rig = map_options(options_);
-  // The map takes pixels for independent and multiplies its covariances by how much they are not: by 6 to 11
-  // on recorded drives. What is known beforehand of the rig is put on the same scale.
-  constexpr double variance_in_common = 6;
-  with_rig.rig = options_.rig.scaled(1 / std::sqrt(variance_in_common));
+  // The map takes pixels for independent and multiplies its covariances by how much they are not. What is
+  // known beforehand of the rig is put on the same scale.
+  noise_factors_.estimate_rig();
+  with_rig.rig = options_.rig.scaled(1 / std::sqrt(NoiseFactors::estimated_rig));
   map_ = cairn::KeyframeMap(rig_, with_rig);
 }
 
@@ -482,6 +483,9 @@ void Pipeline::make_keyframe(const Located& located, const StereoFrame& frame, F
 
 /// Local landmarks without a partner are new.
 void Pipeline::add_landmarks(const std::vector<Match>& known, const StereoFrame& frame) {
+  // A patch says where its landmark is to a twentieth of a pixel, and lenses that are wrong by more do not
+  // let it: on a recorded drive that nothing was chosen on, patches doubled the error.
+  const bool with_patches = !map_.rig_correction();
   std::vector<std::uint8_t> taken(locals_.size(), 0);
   for (const Match& match : known) taken[match.local] = 1;
   for (std::uint32_t i = 0; i < locals_.size(); ++i) {
@@ -489,7 +493,7 @@ void Pipeline::add_landmarks(const std::vector<Match>& known, const StereoFrame&
     const cairn::Keypoint& point = left_->keypoints[locals_[i].point];
     const std::span<const float> look = left_->descriptor(locals_[i].point);
     Landmark landmark;
-    if (locals_[i].pair.refined)
+    if (with_patches && locals_[i].pair.refined)
       if (auto patch = SurfacePatch::of(frame.left, locals_[i].left_pixel, locals_[i].pair.slope,
                                         map_.keyframes_added() - 1))
         landmark.patch = std::make_shared<const SurfacePatch>(*patch);

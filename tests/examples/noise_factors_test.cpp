@@ -23,6 +23,11 @@ TEST_SUITE("noise_factors") {
     for (int i = 0; i < 1000; ++i) bad.observe(frame);
     CHECK(bad.pixels() == doctest::Approx(4).epsilon(0.05));
     CHECK(bad.poses() == doctest::Approx(7.5).epsilon(0.05));
+    stereo_slam::NoiseFactors recorded;
+    recorded.estimate_rig();
+    for (int i = 0; i < 1000; ++i) recorded.observe(frame);
+    CHECK(recorded.poses() == doctest::Approx(18).epsilon(0.05));
+    CHECK(recorded.pixels() == bad.pixels());
   }
 }
 
