@@ -20,7 +20,6 @@ namespace stereo_slam {
 namespace {
 
 constexpr const char* file_kind = "cairnmap";
-constexpr std::uint64_t version = 3;  // 1 had five numbers of the rig, 2 no patches
 
 /// The numbers that the keyframes go by in a file, where those that left are not counted.
 std::vector<std::optional<std::uint32_t>> numbers_in_file(const cairn::KeyframeMap& map) {
@@ -92,12 +91,12 @@ void save_map(const std::filesystem::path& path, const SavedMap& saved) {
   cairn::save_keyframe_map(out, saved.map);
   const auto keyframes = numbers_in_file(saved.map);
   for (const Landmark& landmark : saved.landmarks) put(out, landmark, keyframes);
-  cairn::write_file_atomically(path, out.file(file_kind, version));
+  cairn::write_file_atomically(path, out.file(file_kind, saved_map_version));
 }
 
 SavedMap load_map(const std::filesystem::path& path) {
   const std::string bytes = cairn::read_file(path);
-  cairn::BinaryReader in(bytes, file_kind, version, path.string());
+  cairn::BinaryReader in(bytes, file_kind, saved_map_version, path.string());
   const auto features = in.get<std::uint8_t>();
   if (features >= feature_names.size()) cairn::raise(path.string() + ": the kind of features is unknown");
   const bool oriented = in.get<std::uint8_t>() != 0;

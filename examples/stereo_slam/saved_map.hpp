@@ -7,6 +7,7 @@
 /// killed.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -25,6 +26,9 @@ struct SavedMap {
   cairn::KeyframeMap map;
   std::vector<Landmark> landmarks;  ///< ascending ids, those of the map
 };
+
+/// Of the file: 1 had five numbers of the rig, 2 no patches.
+inline constexpr std::uint64_t saved_map_version = 3;
 
 /// Writes the map; landmarks are numbered 0, 1, 2, ... in the file. Throws cairn::Error naming the path.
 void save_map(const std::filesystem::path& path, const SavedMap& saved);

@@ -4,12 +4,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <string>
 
 #include <doctest/doctest.h>
 
 #include <cairn/core/check.hpp>
+#include <cairn/io/binary_file.hpp>
 #include <cairn/io/file.hpp>
 
 #include "slam/simulated_arena.hpp"
@@ -49,6 +51,21 @@ SavedMap map_of_a_frame() {
 }  // namespace
 
 TEST_SUITE("saved_map") {
+  TEST_CASE("saved_map: the fuzz target begins with maps of this version") {
+    const cairn_test::Folder folder;
+    const auto corpus = std::filesystem::path(__FILE__).parent_path().parent_path() / "fuzz/corpus/drive_map";
+    for (const char* name : {"plain_1", "rig_1"}) {
+      CAPTURE(name);
+      cairn::BinaryWriter numbers;
+      for (const char c : cairn::read_file(corpus / name)) numbers.put(c);
+      cairn::write_file_atomically(folder / "map", numbers.file("cairnmap", stereo_slam::saved_map_version));
+      const SavedMap map = stereo_slam::load_map(folder / "map");
+      CHECK(map.landmarks.size() == 6);
+      CHECK(static_cast<bool>(map.landmarks.front().patch));
+      CHECK(map.map.rig_correction().has_value() == (name == std::string("rig_1")));
+    }
+  }
+
   TEST_CASE("saved_map: everything is there again, landmarks numbered in their order") {
     const cairn_test::Folder folder;
     const SavedMap saved = map_of_a_frame();

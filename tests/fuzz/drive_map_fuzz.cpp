@@ -17,7 +17,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const cairn_fuzz::Scratch scratch;
   cairn::BinaryWriter numbers;
   for (std::size_t i = 0; i < size; ++i) numbers.put(data[i]);
-  const auto path = scratch.put("map", numbers.file("cairnmap", 1));
+  const auto path = scratch.put("map", numbers.file("cairnmap", stereo_slam::saved_map_version));
   try {
     const stereo_slam::SavedMap saved = stereo_slam::load_map(path);
     cairn_fuzz::expect(saved.landmarks.size() == saved.map.landmark_count(), "every landmark is described");
