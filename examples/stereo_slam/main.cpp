@@ -242,7 +242,7 @@ void print_summary(const stereo_slam::RunRecord& record) {
               summary.landmarks);
   if (summary.budget) std::printf("%s\n", stereo_slam::budget_text(*summary.budget).c_str());
   if (!summary.errors) return;
-  std::printf("path %.2f m, error at the end %.3f m, largest %.3f m and %.2f degrees\n", summary.path,
+  std::printf("path %.2f m, error at the end %.3g m, largest %.3g m and %.2g degrees\n", summary.path,
               summary.errors->end, summary.errors->largest.position,
               summary.errors->largest.heading * stereo_slam::degrees);
 }
