@@ -9,6 +9,8 @@
 
 #include <cairn/core/linalg.hpp>
 
+#include "grey_level.hpp"
+
 namespace stereo_slam {
 namespace {
 
@@ -22,19 +24,6 @@ constexpr float settled = 0.01F;  // [pixels]
 /// Grey levels of a patch, row by row; the rest, which fills the vector registers, is zero.
 constexpr int padded = 128;
 using Patch = Eigen::Array<float, padded, 1>;
-
-/// Grey level between pixels, bilinear; the caller keeps (x, y) a pixel away from the rim.
-float sample(cairn::ImageView image, float x, float y) {
-  const int column = static_cast<int>(x);
-  const int line = static_cast<int>(y);
-  const float fx = x - static_cast<float>(column);
-  const float fy = y - static_cast<float>(line);
-  const std::uint8_t* top = image.row(line) + column;
-  const std::uint8_t* bottom = top + image.stride();
-  const float above = static_cast<float>(top[0]) + fx * static_cast<float>(top[1] - top[0]);
-  const float below = static_cast<float>(bottom[0]) + fx * static_cast<float>(bottom[1] - bottom[0]);
-  return above + fy * (below - above);
-}
 
 bool inside(cairn::ImageView image, float x, float y, float margin) {
   return x >= margin && y >= margin && x < static_cast<float>(image.width()) - 1 - margin &&
@@ -62,8 +51,8 @@ void sample_template(cairn::ImageView image, float x, float y, Template& result)
   std::array<float, wide * wide> grey{};
   for (int v = 0, i = 0; v < wide; ++v)
     for (int u = 0; u < wide; ++u, ++i)
-      grey[static_cast<std::size_t>(i)] = sample(image, x + static_cast<float>(u - patch_half - 1),
-                                                 y + static_cast<float>(v - patch_half - 1));
+      grey[static_cast<std::size_t>(i)] = grey_level(image, x + static_cast<float>(u - patch_half - 1),
+                                                     y + static_cast<float>(v - patch_half - 1));
   for (int v = 0, i = 0; v < patch_side; ++v)
     for (int u = 0; u < patch_side; ++u, ++i) {
       const float* at = grey.data() + (v + 1) * wide + u + 1;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "grey_level.hpp"
+
 namespace stereo_slam {
 namespace {
 
@@ -12,16 +14,6 @@ constexpr int half = SurfacePatch::half;
 constexpr int across = 2 * half + 1;
 constexpr int pixels = across * across;
 using Grey = Eigen::Array<float, pixels, 1>;
-
-float sample(const std::uint8_t* image, std::ptrdiff_t stride, float x, float y) {
-  const int column = static_cast<int>(x), line = static_cast<int>(y);
-  const float fx = x - static_cast<float>(column), fy = y - static_cast<float>(line);
-  const std::uint8_t* top = image + line * stride + column;
-  const std::uint8_t* bottom = top + stride;
-  const float above = static_cast<float>(top[0]) + fx * static_cast<float>(top[1] - top[0]);
-  const float below = static_cast<float>(bottom[0]) + fx * static_cast<float>(bottom[1] - bottom[0]);
-  return above + fy * (below - above);
-}
 
 double determinant(const cairn::Matrix<2>& m) {
   return m(0, 0) * m(1, 1) - m(0, 1) * m(1, 0);
@@ -39,14 +31,15 @@ float centre(Grey& grey) {
 }
 
 /// The patch as it was, and what its grey levels do when it moves.
-struct Template {
+struct Reference {
   Grey grey, slope_x, slope_y;
   float norm = 0;
   cairn::Matrix<2, 2, float> inverse;  // of the normal equations
 };
 
-std::optional<Template> template_of(const SurfacePatch& patch) {
-  Template result;
+std::optional<Reference> reference_of(const SurfacePatch& patch) {
+  Reference result;
+  const cairn::ImageView kept(patch.grey.data(), SurfacePatch::side, SurfacePatch::side);
   // What is kept begins half + 1 before the whole part of the centre.
   const float x = static_cast<float>(patch.pixel(0) - std::floor(patch.pixel(0))) + half + 1;
   const float y = static_cast<float>(patch.pixel(1) - std::floor(patch.pixel(1))) + half + 1;
@@ -55,8 +48,7 @@ std::optional<Template> template_of(const SurfacePatch& patch) {
   for (int v = 0, i = 0; v < wide; ++v)
     for (int u = 0; u < wide; ++u, ++i)
       grey[static_cast<std::size_t>(i)] =
-          sample(patch.grey.data(), SurfacePatch::side, x + static_cast<float>(u - half - 1),
-                 y + static_cast<float>(v - half - 1));
+          grey_level(kept, x + static_cast<float>(u - half - 1), y + static_cast<float>(v - half - 1));
   for (int v = 0, i = 0; v < across; ++v)
     for (int u = 0; u < across; ++u, ++i) {
       const float* at = grey.data() + (v + 1) * wide + u + 1;
@@ -126,7 +118,7 @@ bool look(const Warp& warp, const cairn::Vector<2>& d, cairn::ImageView image, G
     for (int u = -half; u <= half; ++u, ++i) {
       const cairn::Vector<2> p = warp(u + d(0), v + d(1));
       if (!(p(0) >= 0 && p(1) >= 0 && p(0) < right && p(1) < bottom)) return false;
-      grey(i) = sample(image.row(0), image.stride(), static_cast<float>(p(0)), static_cast<float>(p(1)));
+      grey(i) = grey_level(image, static_cast<float>(p(0)), static_cast<float>(p(1)));
     }
   return true;
 }
@@ -148,7 +140,7 @@ std::optional<FoundPatch> find_patch(const SurfacePatch& patch, const cairn::Pin
                                      cairn::ImageView image, const cairn::Vector<2>& expected) {
   constexpr int most_steps = 10;
   constexpr double farthest = 2, settled = 0.005;
-  const auto reference = template_of(patch);
+  const auto reference = reference_of(patch);
   const auto sight = sight_of(patch, camera, T_now_then, inverse_depth);
   if (!reference || !sight || !(sight->middle(2) > 0.1)) return std::nullopt;
   const cairn::Vector<2> normalised = sight->middle.head<2>() / sight->middle(2);
