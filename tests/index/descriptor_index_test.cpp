@@ -587,6 +587,38 @@ TEST_SUITE("descriptor_index") {
     CHECK(index.nearest(std::array{100.0F, 2.0F})->distance == 0);
   }
 
+  TEST_CASE("what an empty index takes in says how many coordinates it has") {
+    using cairn_test::message_of;
+    struct Flat {
+      float x, y;
+    };
+    std::vector<Flat> cloud;
+    const cairn::Through seen(cloud, 2,
+                              [](const Flat& p, std::size_t axis) { return axis == 0 ? p.x : p.y; });
+    cairn::DescriptorIndex index(seen);
+    for (int i = 0; i < 40; ++i) cloud.push_back({static_cast<float>(i), 1});
+    index.insert(0, 40);
+    CHECK(index.dimension() == 2);
+    CHECK(index.nearest(std::array{7.0F, 1.0F})->id == 7);
+
+    std::vector<const float*> pointers;
+    cairn::DescriptorIndex of_pointers(pointers);
+    pointers.assign(40, &cloud[0].x);
+    CHECK(message_of([&] { of_pointers.insert(0, 40); }).find("at least one coordinate") !=
+          std::string::npos);
+    CHECK(of_pointers.empty());
+  }
+
+  TEST_CASE("an insertion that is refused makes no codes") {
+    std::vector<std::array<float, 96>> points(1);
+    cairn::DescriptorIndex index(points, {.points_in_cell = 4096});
+    points.resize(std::size_t{1} << 16U);
+    for (std::size_t i = 0; i < points.size(); ++i) points[i][i % 96] = static_cast<float>(i % 251);
+    CHECK(cairn_test::message_of([&] { index.insert(0, points.size()); }).find("point 0 is in the index") !=
+          std::string::npos);
+    CHECK_FALSE(index.coded());
+  }
+
   TEST_CASE("a difference that rounds to a byte's value is not taken for the point") {
     // From -2^33 on, 0.3 and 0.4 are the same 128 steps of 2^26 away.
     const std::vector<float> numbers{-8589934592.0F, 8455716864.0F, 0.3F, 0.4F};

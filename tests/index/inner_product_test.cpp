@@ -133,6 +133,23 @@ TEST_SUITE("inner_product") {
     CHECK(message_of([&] {
             static_cast<void>(lifted.lifted(std::array{1.0F, 2.0F, 3.0F}));
           }).find("expected 2") != std::string::npos);
+    CHECK(message_of([&] { cairn::InnerProductPoints bad(points, std::nanf("")); }).find("nan long") !=
+          std::string::npos);
+    CHECK(message_of([&] { cairn::InnerProductPoints bad(points, -1); }).find("not negative") !=
+          std::string::npos);
+    CHECK(message_of([&] {
+            cairn::InnerProductPoints bad(points, std::numeric_limits<float>::infinity());
+          }).find("inf long") != std::string::npos);
+    const std::vector<const float*> pointers(5, points[0].data());  // which do not say how many numbers
+    CHECK(message_of([&] { cairn::InnerProductPoints bad(pointers); }).find("at least one coordinate") !=
+          std::string::npos);
+    std::vector<std::vector<float>> growing;
+    cairn::InnerProductPoints open(growing, 100);
+    growing = {{1, 2, std::nanf("")}};
+    CHECK(message_of([&] { open.extend(); }).find("coordinate 2 is nan") != std::string::npos);
+    growing = {{1, 2}};
+    open.extend();
+    CHECK(open.dimension() == 3);
     const std::vector<std::array<float, 2>> none;
     const cairn::InnerProductPoints nothing(none);
     const cairn::DescriptorIndex empty(nothing);

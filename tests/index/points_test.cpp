@@ -298,6 +298,29 @@ TEST_SUITE("points") {
           }).find("dimension 0") != std::string::npos);
   }
 
+  TEST_CASE("points: nobody asks a foreign point for more coordinates than it has") {
+    using cairn_test::message_of;
+    struct Flat {
+      double x, y;
+    };
+    const std::vector<Flat> cloud(20, {1, 2});
+    std::size_t beyond = 0;
+    const cairn::Through points(cloud, 2, [&](const Flat& point, std::size_t axis) {
+      beyond += axis > 1;
+      return axis == 0 ? point.x : point.y;
+    });
+    const Tree tree(corners);
+    cairn::MultiKdTree<float> growing;
+    growing.insert(corners);
+    const std::string words = "has 2 coordinates, expected 3";
+    CHECK(message_of([&] { Tree bad(points); }).find(words) != std::string::npos);
+    CHECK(message_of([&] { cairn::BruteForce<float, 3> bad(points); }).find(words) != std::string::npos);
+    CHECK(message_of([&] { growing.insert(points); }).find(words) != std::string::npos);
+    CHECK(message_of([&] { static_cast<void>(tree.nearest(points[0])); }).find(words) != std::string::npos);
+    CHECK(beyond == 0);
+    CHECK(growing.size() == 4);
+  }
+
   TEST_CASE("points: more than can be numbered are refused before anything is read or taken") {
     using cairn_test::message_of;
     const Endless endless{std::size_t{1} << 32};

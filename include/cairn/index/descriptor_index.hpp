@@ -55,6 +55,7 @@
 #include <cairn/index/detail/byte_scale.hpp>
 #include <cairn/index/detail/cell_search.hpp>
 #include <cairn/index/detail/k_means.hpp>
+#include <cairn/index/detail/reset_on_move.hpp>
 #include <cairn/index/metric.hpp>
 #include <cairn/index/points.hpp>
 
@@ -267,10 +268,11 @@ private:
   [[nodiscard]] unsigned depth_for(std::size_t in_cell) const noexcept {
     const double cells = static_cast<double>(size_) / static_cast<double>(in_cell);
     const auto wished = static_cast<unsigned>(std::lround(std::log2(std::max(1.0, cells))));
-    return std::min(wished, static_cast<unsigned>(std::bit_width(size_)) - 1);
+    return std::min(wished, static_cast<unsigned>(std::bit_width(size())) - 1);
   }
 
   void set_dimension(std::size_t dim) {
+    if (dim == 0) raise("DescriptorIndex: point: a point needs at least one coordinate");
     if (dim > detail::most_byte_axes)
       raise("DescriptorIndex: a point may have 16384 coordinates at most, got " + std::to_string(dim));
     scale_ = detail::ByteScale(std::vector<float>(dim));
@@ -296,11 +298,11 @@ private:
       error = std::max(error, missed.rounding);
       inside = inside && missed.outside_squared == 0;
     }
-    if (!coded() && codes_pay(size_ + ids.size())) cells_.take_codes(options_.threads);
     cells_.number_places(ids.back());
     for (const PointId id : ids)
       if (cells_.contains(id))
         raise("DescriptorIndex::insert: point " + std::to_string(id) + " is in the index already");
+    if (!coded() && codes_pay(size_ + ids.size())) cells_.take_codes(options_.threads);
     // Nothing is in where one could not be put in; a guard, for those who compile without exceptions.
     struct Insertion {
       DescriptorIndex& index;
@@ -379,7 +381,7 @@ private:
 
   const Points* points_;
   DescriptorIndexOptions options_;
-  std::size_t size_ = 0;
+  detail::ResetOnMove<std::size_t> size_;
   detail::ByteScale scale_;
   float error_ = 0;     ///< what rounding misses of any point at most, in bytes
   bool inside_ = true;  ///< whether all points are in the box of bytes

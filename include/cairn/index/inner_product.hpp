@@ -62,8 +62,11 @@ public:
   /// `longest`: no point that joins later may be longer; 0: the longest of those that are there. Throws
   /// Error, naming the point, where one is longer than that, not finite, or of another dimension. O(n dim).
   explicit InnerProductPoints(const Points& points, float longest = 0) : points_(&points), longest_(longest) {
+    if (!(longest >= 0 && longest < std::numeric_limits<float>::infinity()))
+      raise("InnerProductPoints: the longest point is " + std::to_string(longest) +
+            " long, expected a finite number that is not negative");
     if (longest == 0)
-      for (const double square : squares_from(0)) longest_ = std::max(longest_, norm_of(square));
+      for (const double square : squares_from(0).squares) longest_ = std::max(longest_, norm_of(square));
     extend();
   }
   explicit InnerProductPoints(const Points&&, float = 0) = delete;  ///< would be gone
@@ -72,7 +75,7 @@ public:
   /// then.
   void extend() {
     const std::size_t first = heights_.size();
-    const std::vector<double> squares = squares_from(first);
+    const auto [dim, squares] = squares_from(first);
     std::vector<float> heights(heights_);
     const double most = double{longest_} * double{longest_};
     for (std::size_t i = 0; i < squares.size(); ++i) {
@@ -81,6 +84,7 @@ public:
               std::to_string(norm_of(squares[i])) + " long, expected at most " + std::to_string(longest_));
       heights.push_back(static_cast<float>(std::sqrt(std::max(0.0, most - squares[i]))));
     }
+    dim_ = dim;
     heights_ = std::move(heights);
   }
 
@@ -114,19 +118,25 @@ private:
     return double{rounded} < norm ? std::nextafter(rounded, std::numeric_limits<float>::infinity()) : rounded;
   }
 
-  [[nodiscard]] std::vector<double> squares_from(std::size_t first) {
+  /// Squared norms of points, and how many coordinates these have.
+  struct Squares {
+    std::size_t dim;
+    std::vector<double> squares;
+  };
+  [[nodiscard]] Squares squares_from(std::size_t first) const {
     const auto count = static_cast<std::size_t>(points_->size());
     detail::check_count(count, "InnerProductPoints: point");
-    if (dim_ == 0 && count > 0) dim_ = detail::dimension_of<dynamic_dim>(*points_);
-    std::vector<float> row(dim_);
-    std::vector<double> squares;
+    Squares found{dim_ == 0 && count > 0 ? detail::dimension_of<dynamic_dim>(*points_) : dim_, {}};
+    if (found.dim == 0 && count > 0)
+      raise("InnerProductPoints: point: a point needs at least one coordinate");
+    std::vector<float> row(found.dim);
     for (std::size_t i = first; i < count; ++i) {
-      detail::copy_point<float>((*points_)[i], dim_, row.data(), {"InnerProductPoints: point", i});
+      detail::copy_point<float>((*points_)[i], row.size(), row.data(), {"InnerProductPoints: point", i});
       double sum = 0;
       for (const float number : row) sum += double{number} * double{number};
-      squares.push_back(sum);
+      found.squares.push_back(sum);
     }
-    return squares;
+    return found;
   }
 
   const Points* points_;

@@ -98,11 +98,11 @@ public:
     return KdTree(std::move(rows), ids, dim, std::move(metric), options.threads);
   }
 
-  [[nodiscard]] std::size_t size() const noexcept { return parts_.layout.points(); }
+  [[nodiscard]] std::size_t size() const noexcept { return parts_.layout->points(); }
   [[nodiscard]] bool empty() const noexcept { return size() == 0; }
   [[nodiscard]] std::size_t dimension() const noexcept { return Dim != dynamic_dim ? Dim : dim_; }
-  [[nodiscard]] std::size_t leaves() const noexcept { return parts_.layout.leaves(); }
-  [[nodiscard]] unsigned depth() const noexcept { return parts_.layout.depth(); }
+  [[nodiscard]] std::size_t leaves() const noexcept { return parts_.layout->leaves(); }
+  [[nodiscard]] unsigned depth() const noexcept { return parts_.layout->depth(); }
   [[nodiscard]] const M& metric() const noexcept { return metric_; }
   /// Memory held, the points included.
   [[nodiscard]] std::size_t bytes() const noexcept {
@@ -225,7 +225,7 @@ private:
   template <class C>
   void descend(unsigned depth, std::size_t slot, Real bound, const Real* query, Real* offsets, C& collector,
                Work& work) const {
-    const detail::Range leaves = parts_.layout.leaves_below(depth, slot);
+    const detail::Range leaves = parts_.layout->leaves_below(depth, slot);
     if (leaves.size() == 1) return scan_leaf(leaves.begin, query, collector, work);
     ++work.nodes;
     const detail::Split<Scalar>& here = parts_.splits[detail::KdLayout::split_at(depth, slot)];

@@ -15,6 +15,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/index/collectors.hpp>
+#include <cairn/index/detail/reset_on_move.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
 
@@ -165,11 +166,11 @@ private:
   }
 
   Probation probation_;
-  std::uint32_t step_ = 0;
+  detail::ResetOnMove<std::uint32_t> step_;
   std::vector<Record> records_;
   std::vector<LandmarkId> on_probation_;
-  std::size_t probation_size_ = 0;
-  std::size_t base_size_ = 0;
+  detail::ResetOnMove<std::size_t> probation_size_;
+  detail::ResetOnMove<std::size_t> base_size_;
 };
 
 }}  // namespace cairn::CAIRN_ABI

@@ -35,6 +35,7 @@
 #include <cairn/core/sizes.hpp>
 #include <cairn/index/collectors.hpp>
 #include <cairn/index/detail/block_lanes.hpp>
+#include <cairn/index/detail/reset_on_move.hpp>
 #include <cairn/index/metric.hpp>
 #include <cairn/index/points.hpp>
 #include <cairn/index/ratio_test.hpp>
@@ -91,7 +92,7 @@ private:
   }
 
   std::size_t dim_ = 0;
-  std::size_t count_ = 0;
+  detail::ResetOnMove<std::size_t> count_;
   float largest_square_ = 0;
   detail::AlignedVector<float> coordinates_;
   detail::AlignedVector<float> squares_;

@@ -254,14 +254,16 @@ public:
   class View {
   public:
     using size_type = std::size_t;
+    [[nodiscard]] std::size_t size() const noexcept { return dim_; }
     [[nodiscard]] auto operator[](std::size_t axis) const { return (*coordinate_)((*set_)[i_], axis); }
 
   private:
     friend class Through;
-    View(const Set* set, std::size_t i, const Coordinate* coordinate)
-        : set_(set), i_(i), coordinate_(coordinate) {}
+    View(const Set* set, std::size_t i, std::size_t dim, const Coordinate* coordinate)
+        : set_(set), i_(i), dim_(dim), coordinate_(coordinate) {}
     const Set* set_;
     std::size_t i_;
+    std::size_t dim_;
     const Coordinate* coordinate_;
   };
 
@@ -274,7 +276,7 @@ public:
 
   [[nodiscard]] std::size_t size() const noexcept { return static_cast<std::size_t>(set_->size()); }
   [[nodiscard]] std::size_t dimension() const noexcept { return dim_; }
-  [[nodiscard]] View operator[](std::size_t i) const& { return View(set_, i, &coordinate_); }
+  [[nodiscard]] View operator[](std::size_t i) const& { return View(set_, i, dim_, &coordinate_); }
   View operator[](std::size_t) const&& = delete;  ///< the view would refer to what is gone
 
 private:

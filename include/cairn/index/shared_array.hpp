@@ -15,6 +15,7 @@
 #include <cstddef>
 
 #include <cairn/core/counted.hpp>
+#include <cairn/index/detail/reset_on_move.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
@@ -76,9 +77,9 @@ private:
 
   static inline const T blank{};
   Counted<Branch> root_;
-  int height_ = 0;  // levels of branches
-  std::size_t size_ = 0;
-  std::size_t copies_ = 0;
+  detail::ResetOnMove<int> height_;  // levels of branches
+  detail::ResetOnMove<std::size_t> size_;
+  detail::ResetOnMove<std::size_t> copies_;
 };
 
 }}  // namespace cairn::CAIRN_ABI

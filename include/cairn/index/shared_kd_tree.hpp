@@ -22,6 +22,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/counted.hpp>
+#include <cairn/index/detail/reset_on_move.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
@@ -232,7 +233,7 @@ private:
   }
 
   Below root_;
-  std::size_t copies_ = 0;
+  detail::ResetOnMove<std::size_t> copies_;
 };
 
 }}  // namespace cairn::CAIRN_ABI

@@ -21,13 +21,14 @@
 #include <cairn/index/detail/kd_layout.hpp>
 #include <cairn/index/detail/kd_split.hpp>
 #include <cairn/index/detail/leaf_blocks.hpp>
+#include <cairn/index/detail/reset_on_move.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
 /// What a tree consists of. boxes are empty above few_axes dimensions.
 template <class Scalar>
 struct KdParts {
-  KdLayout layout;
+  ResetOnMove<KdLayout> layout;
   LeafBlocks<Scalar> blocks;
   std::vector<Split<Scalar>> splits;
   BoxTree<Scalar> boxes;
@@ -102,7 +103,7 @@ private:
 
   /// Splits a slot down to its leaves.
   [[gnu::noinline]] void split_down(const Slot& at, typename Points::Scratch& scratch) {
-    if (parts_.layout.leaves_below(at.depth, at.slot).size() <= 1) return;
+    if (parts_.layout->leaves_below(at.depth, at.slot).size() <= 1) return;
     split(at, scratch);
     split_down({at.depth + 1, 2 * at.slot}, scratch);
     split_down({at.depth + 1, 2 * at.slot + 1}, scratch);
@@ -111,7 +112,7 @@ private:
   /// Splits a slot down to its leaves and writes them.
   [[gnu::noinline]] void make_leaves(const Slot& at, typename Points::Scratch& scratch) {
     split_down(at, scratch);
-    parts_.blocks.fill(points_, parts_.layout, parts_.layout.leaves_below(at.depth, at.slot));
+    parts_.blocks.fill(points_, parts_.layout, parts_.layout->leaves_below(at.depth, at.slot));
   }
 
   std::uint64_t split_next() {
@@ -141,7 +142,7 @@ private:
   std::uint64_t box_next() {
     const std::size_t end = std::min(boxed_ + nodes_in_piece, parts_.boxes.last_nodes());
     parts_.boxes.fill_last(parts_.blocks, {boxed_, end});
-    const std::size_t points = share(parts_.layout.points(), end - boxed_, parts_.boxes.last_nodes());
+    const std::size_t points = share(parts_.layout->points(), end - boxed_, parts_.boxes.last_nodes());
     boxed_ = end;
     if (boxed_ == parts_.boxes.last_nodes()) {
       parts_.boxes.fill_above();
@@ -155,7 +156,7 @@ private:
     start();
     if (todo_.empty()) return;
     std::vector<Slot> slots = std::exchange(todo_, {});
-    while (slots.size() < threads && parts_.layout.leaves() >= 4 * slots.size()) {
+    while (slots.size() < threads && parts_.layout->leaves() >= 4 * slots.size()) {
       parallel_for(slots.size(), threads, [&](std::size_t begin, std::size_t end) {
         typename Points::Scratch scratch(dim_);
         for (std::size_t i = begin; i < end; ++i) split(slots[i], scratch);

@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include <cairn/index/detail/reset_on_move.hpp>
 #include <cairn/index/detail/tree_merge.hpp>
 #include <cairn/index/kd_tree.hpp>
 #include <cairn/index/multi_tree_shape.hpp>
@@ -160,8 +161,8 @@ private:
   std::vector<TreePointer> resting_;     ///< smallest first
   std::vector<TreeMerge<Tree>> merges_;  ///< in the order they were started
   std::vector<const Tree*> view_;
-  std::size_t stored_ = 0;
-  std::uint64_t points_moved_ = 0;
+  ResetOnMove<std::size_t> stored_;
+  ResetOnMove<std::uint64_t> points_moved_;
 };
 
 // Outside of the class, and so not inline: cairn::compiled may hold them (multi_kd_tree.hpp).

@@ -52,6 +52,7 @@
 #include <cairn/core/parallel.hpp>
 #include <cairn/index/detail/block_lanes.hpp>
 #include <cairn/index/detail/byte_blocks.hpp>
+#include <cairn/index/detail/reset_on_move.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
@@ -269,7 +270,7 @@ private:
     }
   }
 
-  std::size_t dim_ = 0;
+  ResetOnMove<std::size_t> dim_;
   std::vector<std::uint32_t> place_of_;  ///< of each coordinate
   std::vector<std::uint32_t> axis_at_;   ///< of each place; dim_ where there is none
   std::vector<float> origin_;

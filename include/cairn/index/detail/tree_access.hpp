@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <utility>
 
+#include <cairn/index/detail/kd_layout.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
@@ -16,12 +17,12 @@ namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 struct TreeAccess {
   /// The shape: which leaves stand below which slot.
   template <class Tree>
-  [[nodiscard]] static const auto& layout(const Tree& tree) noexcept {
+  [[nodiscard]] static const KdLayout& layout(const Tree& tree) noexcept {
     return tree.parts_.layout;
   }
   template <class Tree>
   [[nodiscard]] static const auto& split(const Tree& tree, unsigned depth, std::size_t slot) noexcept {
-    return tree.parts_.splits[tree.parts_.layout.split_at(depth, slot)];
+    return tree.parts_.splits[KdLayout::split_at(depth, slot)];
   }
   /// The points, leaf by leaf.
   template <class Tree>
