@@ -494,7 +494,8 @@ void Pipeline::add_landmarks(const std::vector<Match>& known, const StereoFrame&
     const std::span<const float> look = left_->descriptor(locals_[i].point);
     Landmark landmark;
     if (with_patches && locals_[i].pair.refined)
-      if (auto patch = SurfacePatch::of(frame.left, locals_[i].left_pixel, locals_[i].pair.slope,
+      if (auto patch = SurfacePatch::of(frame.left, locals_[i].left_pixel,
+                                        match_stereo_->slope_of_inverse_depth(locals_[i].pair),
                                         map_.keyframes_added() - 1))
         landmark.patch = std::make_shared<const SurfacePatch>(*patch);
     if (landmark.patch) locals_[i].sigma = options_.patch_sigma;

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <optional>
 #include <ranges>
 #include <utility>
 
@@ -50,19 +49,6 @@ struct StereoMatcher::Nearest {
   std::vector<float> second_of_left;
   std::vector<Best> of_right;
 };
-
-namespace {
-
-/// Column of a pixel in the frame in which the baseline is the x axis, for a focal length of 1.
-std::optional<double> column(const cairn::PinholeCamera& camera, const cairn::Matrix<3>& rotation,
-                             const cairn::Vector<2>& pixel) {
-  const auto ray = camera.unproject(pixel);
-  if (!ray) return std::nullopt;
-  const cairn::Vector<3> turned = cairn::product(rotation, *ray);
-  return turned(0) / turned(2);
-}
-
-}  // namespace
 
 StereoMatcher::StereoMatcher(const cairn::StereoRig& rig, const StereoMatcherOptions& options)
     : rig_(rig), options_(options), focal_(rig.left.fy()) {
@@ -190,16 +176,19 @@ void StereoMatcher::refine(PointPair& match, cairn::ImageView left, cairn::Image
   match.refined = true;
   match.stretch = aligned->stretch;
   match.shear = aligned->shear;
-  match.slope = slope_of_inverse_depth(match);
 }
 
 cairn::Vector<2> StereoMatcher::slope_of_inverse_depth(const PointPair& match) const {
-  const auto disparity = [&](const cairn::Vector<2>& step) {
-    const auto l = column(rig_.left, R_rows_left_, match.left_pixel + step);
-    const auto r = column(rig_.right, R_rows_right_, match.right_pixel + match.right_step(step));
-    return l && r ? *l - *r : 0.0;
+  // A disparity is over the depth along the view of the rows; the left camera's own view may be another.
+  const auto inverse_depth = [&](const cairn::Vector<2>& step) {
+    const auto left_ray = rig_.left.unproject(match.left_pixel + step);
+    const auto right_ray = rig_.right.unproject(match.right_pixel + match.right_step(step));
+    if (!left_ray || !right_ray) return 0.0;
+    const cairn::Vector<3> l = cairn::product(R_rows_left_, *left_ray),
+                           r = cairn::product(R_rows_right_, *right_ray);
+    return (l(0) / l(2) - r(0) / r(2)) * l(2);
   };
-  const double here = disparity({0, 0}), right = disparity({1, 0}), below = disparity({0, 1});
+  const double here = inverse_depth({0, 0}), right = inverse_depth({1, 0}), below = inverse_depth({0, 1});
   if (!(here > 0 && right > 0 && below > 0)) return {0, 0};
   return {right / here - 1, below / here - 1};
 }

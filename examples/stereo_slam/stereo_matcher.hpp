@@ -40,10 +40,8 @@ struct PointPair {
   cairn::Vector<2> left_pixel;
   cairn::Vector<2> right_pixel;  ///< refined
   bool refined = false;
-  /// Of a refined one: where the partner moves with the left point, right(u) = u + stretch u + shear v, and
-  /// by what part of itself the inverse depth of the surface grows from pixel to pixel of the left image.
+  /// Of a refined one: where the partner moves with the left point, right(u) = u + stretch u + shear v.
   float stretch = 0, shear = 0;
-  cairn::Vector<2> slope = cairn::Vector<2>::Zero();
 
   /// Where the partner moves when the left point moves a little.
   [[nodiscard]] cairn::Vector<2> right_step(const cairn::Vector<2>& left_step) const noexcept {
@@ -63,6 +61,10 @@ public:
                                                   cairn::ImageView right_image, const cairn::Features& right,
                                                   unsigned threads) const;
 
+  /// By what part of itself the inverse of the depth in the left camera grows from pixel to pixel of its
+  /// image, on the surface that a refined pair is of; 0 where that is not in front of both cameras.
+  [[nodiscard]] cairn::Vector<2> slope_of_inverse_depth(const PointPair& match) const;
+
 private:
   struct RowPoint;
   class Rows;
@@ -75,7 +77,6 @@ private:
   [[nodiscard]] Nearest nearest(const cairn::Features& left, const cairn::Features& right,
                                 unsigned threads) const;
   void refine(PointPair& match, cairn::ImageView left, cairn::ImageView right) const;
-  [[nodiscard]] cairn::Vector<2> slope_of_inverse_depth(const PointPair& match) const;
 
   cairn::StereoRig rig_;
   StereoMatcherOptions options_;

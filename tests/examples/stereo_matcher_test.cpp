@@ -122,6 +122,38 @@ TEST_SUITE("stereo_matcher") {
     for (const auto& pair : pairs) CHECK(pair.left != pair.right);
   }
 
+  TEST_CASE("stereo_matcher: the slope of a pair is that of the surface's inverse depth, whatever the rig") {
+    const cairn::StereoRig crooked = crooked_rig();
+    const cairn::StereoRig parallel{camera(0), camera(0), cairn::SE3({}, {0.2, 0, 0})};
+    const cairn::Vector<3> normal = cairn::Vector<3>(0.3, -0.8, -0.5).normalized();
+    for (const cairn::StereoRig& rig : {crooked, parallel}) {
+      // Of the plane normal . x = -1.2, seen in the left camera.
+      const auto depth = [&](const cairn::Vector<2>& pixel) {
+        return -1.2 / normal.dot(*rig.left.unproject(pixel));
+      };
+      const auto partner = [&](const cairn::Vector<2>& pixel) {
+        const auto seen = rig.project(depth(pixel) * *rig.left.unproject(pixel));
+        REQUIRE(seen);
+        return cairn::Vector<2>(seen->tail<2>());
+      };
+      const stereo_slam::StereoMatcher matcher(rig, {});
+      const cairn::Vector<2> x(1, 0), y(0, 1);
+      for (const cairn::Vector<2>& pixel : {cairn::Vector<2>(320, 240), cairn::Vector<2>(90, 400)}) {
+        stereo_slam::PointPair pair{0, 0, pixel, partner(pixel), true};
+        pair.stretch = static_cast<float>(partner(pixel + x)(0) - partner(pixel)(0)) - 1;
+        pair.shear = static_cast<float>(partner(pixel + y)(0) - partner(pixel)(0));
+        const cairn::Vector<2> slope = matcher.slope_of_inverse_depth(pair),
+                               truth(depth(pixel) / depth(pixel + x) - 1,
+                                     depth(pixel) / depth(pixel + y) - 1);
+        CAPTURE(truth.transpose());
+        CHECK((slope - truth).norm() < 0.01 * truth.norm());
+      }
+    }
+    const stereo_slam::StereoMatcher matcher(parallel, {});
+    CHECK(matcher.slope_of_inverse_depth({0, 0, {300, 200}, {310, 200}, true}).isZero());  // behind
+    CHECK(matcher.slope_of_inverse_depth({0, 0, {NAN, 200}, {290, 200}, true}).isZero());
+  }
+
   TEST_CASE("stereo_matcher: no points give no pairs; a baseline along the view is refused in words") {
     const cairn::StereoRig rig = crooked_rig();
     cairn::Features none;
