@@ -1,9 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
-#include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -76,27 +74,6 @@ TEST_SUITE("byte_blocks") {
       block.distances(0, 1, query, distances);
       CHECK(distances[0] == (from_high ? most : 0));
       CHECK(distances[1] == (from_high ? 0 : most));
-    }
-  }
-
-  TEST_CASE("SmallestFirst: in ascending order, equals by place") {
-    cairn::Random random(cairn_test::seed(87));
-    detail::SmallestFirst smallest;
-    for (const std::size_t count : {1U, 15U, 16U, 17U, 300U, 5000U}) {
-      std::vector<std::int32_t> numbers(count);
-      for (std::int32_t& number : numbers) number = static_cast<std::int32_t>(random.below(count));
-      smallest.resize(count);
-      std::copy(numbers.begin(), numbers.end(), smallest.keys());
-      smallest.reset();
-      std::vector<std::pair<std::int32_t, std::size_t>> order;
-      for (std::size_t i = 0; i < count; ++i) order.emplace_back(numbers[i], i);
-      std::sort(order.begin(), order.end());
-      for (const auto& [number, place] : order) {
-        const auto item = smallest.next();
-        REQUIRE(item.place == place);
-        REQUIRE(item.key == number);
-      }
-      CHECK(smallest.next().place == detail::SmallestFirst::none);
     }
   }
 }

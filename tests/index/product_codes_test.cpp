@@ -10,6 +10,9 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
+#include <cairn/index/detail/code_blocks.hpp>
+#include <cairn/index/detail/code_kernels.hpp>
+#include <cairn/index/detail/code_tables.hpp>
 #include <cairn/index/detail/product_codes.hpp>
 
 #include "support/processors.hpp"

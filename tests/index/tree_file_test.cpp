@@ -23,7 +23,8 @@ namespace {
 
 using Tree = cairn::KdTree<float, 3>;
 
-std::string saved(const Tree& tree) {
+template <class T>
+std::string saved(const T& tree) {
   std::ostringstream out;
   cairn::save_tree(out, tree);
   return out.str();
@@ -154,6 +155,23 @@ TEST_SUITE("tree_file") {
     std::istringstream in(out.str());
     CHECK(cairn::load_tree<cairn::KdTree<double, 2>>(in, "memory").nearest(doubles[1])->id == 1);
     CHECK(cairn::load_tree<cairn::KdTree<std::int16_t, 2>>(in, "memory").nearest(words[0])->distance == 0);
+  }
+
+  TEST_CASE("tree_file: numbers of one kind are not read as those of another that has as many bytes") {
+    const std::vector<std::array<int, 3>> points{{1, 2, 3}, {4, 5, 6}};
+    const std::string floats = saved(cairn::KdTree<float, 3>(points));
+    const std::string wholes = saved(cairn::KdTree<std::int32_t, 3>(points));
+    const std::string naturals = saved(cairn::KdTree<std::uint32_t, 3>(points));
+    CHECK(refusal<cairn::KdTree<float, 3>>(wholes) ==
+          "a.tree: coordinates of 4 bytes (whole numbers), expected 4 bytes");
+    CHECK(refusal<cairn::KdTree<std::int32_t, 3>>(naturals) ==
+          "a.tree: coordinates of 4 bytes (whole numbers from 0 on), expected 4 bytes (whole numbers)");
+    CHECK(refusal<cairn::KdTree<std::uint32_t, 3>>(floats) ==
+          "a.tree: coordinates of 4 bytes, expected 4 bytes (whole numbers from 0 on)");
+    CHECK(refusal<cairn::KdTree<std::int8_t>>(saved(cairn::KdTree<std::uint8_t>(points))) ==
+          "a.tree: coordinates of 1 bytes (whole numbers from 0 on), expected 1 bytes (whole numbers)");
+    CHECK(refusal<cairn::KdTree<std::uint32_t, 3>>(naturals).empty());
+    CHECK(refusal<cairn::KdTree<std::int32_t, 3>>(wholes).empty());
   }
 
   TEST_CASE("tree_file: what is foreign is refused by what it is") {

@@ -49,8 +49,9 @@
 #include <cairn/core/check.hpp>
 #include <cairn/index/collectors.hpp>
 #include <cairn/index/detail/answers.hpp>
-#include <cairn/index/detail/byte_blocks.hpp>
+#include <cairn/index/detail/block_lanes.hpp>
 #include <cairn/index/detail/byte_cells.hpp>
+#include <cairn/index/detail/byte_kernels.hpp>
 #include <cairn/index/detail/byte_offer.hpp>
 #include <cairn/index/detail/byte_scale.hpp>
 #include <cairn/index/detail/cell_search.hpp>

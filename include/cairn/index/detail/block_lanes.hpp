@@ -59,6 +59,22 @@ template <class Real, class Scalar>
   }
 }
 
+/// Writes sixteen whole numbers from 0 to 255 as bytes, in two steps: gcc 12 takes them apart one by one.
+[[gnu::always_inline]] inline void store_bytes(const Block<std::int32_t>& numbers,
+                                               std::uint8_t* to) noexcept {
+#if defined(__x86_64__)
+  __m128i quarter[4];
+  std::memcpy(quarter, &numbers, sizeof(numbers));
+  const __m128i low = _mm_packs_epi32(quarter[0], quarter[1]);
+  const __m128i high = _mm_packs_epi32(quarter[2], quarter[3]);
+  _mm_storeu_si128(reinterpret_cast<__m128i*>(to), _mm_packus_epi16(low, high));
+#else
+  const auto halves = __builtin_convertvector(numbers, Block<std::int16_t>);
+  const auto bytes = __builtin_convertvector(halves, Block<std::uint8_t>);
+  std::memcpy(to, &bytes, sizeof(bytes));
+#endif
+}
+
 /// Bit i is set where number i is below the limit.
 template <class Real>
 [[gnu::always_inline]] inline unsigned mask_below(const Block<Real>& numbers, Real limit) noexcept {

@@ -2,13 +2,20 @@
 // SPDX-License-Identifier: MIT
 //
 /// @file
-/// Points of bytes in cells around means that take in points, lose them and split.
+/// Cells around means that take in points, lose them and split: where in memory the points of which cell are.
 ///
-/// The points of a cell stand in blocks of its own, one after the other, the last one filled up with
-/// no_point. A cell that outgrows its blocks moves behind all others; what is left empty is given up once it
-/// is a quarter of all. With codes (product_codes.hpp) the blocks hold those, and the bytes stand in the same
-/// order point by point: they are asked for one by one. Where a point stands is written down from the first
-/// change on: an index that never changes pays nothing for it.
+/// A cell has a few blocks of sixteen places, one after the other, the last one filled up with no_point, and
+/// room for more behind them:
+///
+///   blocks     | cell 0 ... (room) | cell 2 ... | (of no cell) | cell 1 ... (room) | ...
+///   Extent     first, count, room, radius: of each cell     ids_: of each place
+///   block_of_  of each id     cell_of_: of each block     (from the first change on)
+///
+/// A cell that outgrows its room moves behind all others, with a quarter more; what is left empty is given up
+/// once it is a quarter of all. So an insertion is O(cells dim), which finding the nearest mean takes, and
+/// now and then O(most dim) for a split; an erasure O(1). Where a point stands is written down from the first
+/// change on: an index that never changes pays nothing for it. What stands at the places is
+/// cell_points.hpp's.
 #pragma once
 
 #include <algorithm>
@@ -22,8 +29,10 @@
 
 #include <cairn/index/collectors.hpp>
 #include <cairn/index/detail/byte_blocks.hpp>
+#include <cairn/index/detail/byte_kernels.hpp>
+#include <cairn/index/detail/cell_codes.hpp>
+#include <cairn/index/detail/cell_points.hpp>
 #include <cairn/index/detail/k_means.hpp>
-#include <cairn/index/detail/product_codes.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
@@ -54,11 +63,12 @@ public:
       }
     const auto row_of = [&](std::size_t place, std::uint8_t*) { return row_at[place]; };
     if (coded) {
-      learn_codes(row_of, threads);
+      points_ = CellPoints(dim, learn_codes(*this, row_of, threads));
     } else {
-      members_ = ByteBlocks(dim, blocks);
-      for (std::size_t place = 0; place < ids_.size(); ++place)
-        if (row_at[place] != nullptr) members_.set(place, row_at[place]);
+      points_ = CellPoints(dim, blocks);
+      for (std::size_t c = 0; c < cells.size(); ++c)
+        for (std::size_t i = 0; i < extents_[c].count; ++i)
+          points_.set(first_place(c) + i, row_at[first_place(c) + i], means_, c);
     }
     for (std::size_t c = 0; c < cells.size(); ++c) {
       mean_.set(mean_of(c), dim);
@@ -68,24 +78,21 @@ public:
 
   [[nodiscard]] std::size_t size() const noexcept { return extents_.size(); }
   [[nodiscard]] const ByteBlocks& means() const noexcept { return means_; }
-  /// Of all places, where there are no codes.
-  [[nodiscard]] const ByteBlocks& members() const noexcept { return members_; }
-  [[nodiscard]] bool coded() const noexcept { return !codebook_.empty(); }
-  [[nodiscard]] const ProductCodebook& codebook() const noexcept { return codebook_; }
-  /// Of all places, where there are codes.
-  [[nodiscard]] const CodeBlocks& codes() const noexcept { return codes_; }
-  /// Of all places, where there are codes.
-  [[nodiscard]] const ByteRows& rows() const noexcept { return rows_; }
-  /// Root mean square of (q - p).e over |q - p| |e| (product_codes.hpp).
-  [[nodiscard]] float spread() const noexcept { return spread_; }
+  [[nodiscard]] std::size_t dimension() const noexcept { return dim_; }
+  /// Of all places.
+  [[nodiscard]] const CellPoints& points() const noexcept { return points_; }
+  [[nodiscard]] bool coded() const noexcept { return points_.coded(); }
   /// Reads the bytes of point i of a cell.
   void get(std::size_t cell, std::size_t i, std::uint8_t* row) const noexcept {
-    get_at(extents_[cell].place() + i, row);
+    points_.get(first_place(cell) + i, row);
   }
   [[nodiscard]] std::size_t first_block(std::size_t cell) const noexcept { return extents_[cell].first; }
+  [[nodiscard]] std::size_t first_place(std::size_t cell) const noexcept { return extents_[cell].place(); }
   [[nodiscard]] std::size_t blocks_of(std::size_t cell) const noexcept {
     return blocks_for(extents_[cell].count);
   }
+  /// Of all cells, those of none among them.
+  [[nodiscard]] std::size_t blocks() const noexcept { return ids_.size() / block_size; }
   [[nodiscard]] PointId id_of(std::size_t place) const noexcept { return ids_[place]; }
   /// Of a block's sixteen points; no_point where there is none.
   [[nodiscard]] const PointId* ids_of(std::size_t block) const noexcept {
@@ -97,20 +104,18 @@ public:
   /// How far a cell's points are from its mean at most, in bytes.
   [[nodiscard]] float radius(std::size_t cell) const noexcept { return extents_[cell].radius; }
   [[nodiscard]] std::size_t bytes() const noexcept {
-    return members_.bytes() + codes_.bytes() + rows_.bytes() + codebook_.bytes() + means_.bytes() +
-           ids_.capacity() * sizeof(PointId) + extents_.capacity() * sizeof(Extent) +
+    return points_.bytes() + means_.bytes() + ids_.capacity() * sizeof(PointId) +
+           extents_.capacity() * sizeof(Extent) +
            (block_of_.capacity() + cell_of_.capacity()) * sizeof(std::uint32_t);
   }
 
   /// Makes codes for all points, which have none yet. A call that throws changes nothing.
   void take_codes(unsigned threads) {
-    learn_codes(
-        [this](std::size_t place, std::uint8_t* row) {
-          members_.get(place, row);
-          return static_cast<const std::uint8_t*>(row);
-        },
-        threads);
-    members_ = ByteBlocks();
+    const auto row_of = [this](std::size_t place, std::uint8_t* row) {
+      points_.get(place, row);
+      return static_cast<const std::uint8_t*>(row);
+    };
+    points_ = CellPoints(dim_, learn_codes(*this, row_of, threads));
   }
 
   /// Has to be called before contains(), insert() or erase(), and before ids up to `last` are inserted. A
@@ -160,7 +165,7 @@ public:
         block * block_size + static_cast<std::size_t>(std::find(lanes, lanes + block_size, id) - lanes);
     const std::size_t last = extents_[cell].place() + --extents_[cell].count;
     if (place != last) {
-      copy(last, place);
+      points_.copy(last, place);
       ids_[place] = ids_[last];
       block_of_[ids_[place]] = static_cast<std::uint32_t>(block);
     }
@@ -189,58 +194,17 @@ private:
     return std::sqrt(static_cast<float>(square)) * 1.0001F;
   }
 
-  [[nodiscard]] std::size_t blocks() const noexcept { return ids_.size() / block_size; }
-
-  void get_at(std::size_t place, std::uint8_t* row) const noexcept {
-    if (coded())
-      std::copy_n(rows_.row(place), dim_, row);
-    else
-      members_.get(place, row);
-  }
-  void copy(std::size_t from, std::size_t to) noexcept {
-    if (coded()) {
-      codes_.copy_from(codes_, from, to);
-      rows_.set(to, rows_.row(from));
-    } else {
-      members_.copy(from, to);
-    }
-  }
-
-  /// Codes of all points; row_of(place, scratch) gives the bytes of one.
-  template <class RowOf>
-  void learn_codes(const RowOf& row_of, unsigned threads);
-  /// What points of the index meet in the nearest cell that is not theirs.
-  struct Spread {
-    float of_products = 1;     ///< root mean square of (q - p).e over |q - p| |e|
-    float largest_number = 1;  ///< and half as much again
-    float largest_missed = 1;
-  };
-  template <class RowOf>
-  [[nodiscard]] Spread measure_spread(const ProductCodebook& codebook, const RowOf& row_of) const;
-
   /// From mean_, the cell's.
   void measure_radius(std::size_t cell) {
     keys_.resize(blocks_of(cell) * block_size);
-    std::uint32_t place = static_cast<std::uint32_t>(extents_[cell].place());
-    if (coded())
-      for (std::size_t i = 0; i < extents_[cell].count; ++i, ++place)
-        rows_.distances(&place, 1, mean_, &keys_[i]);
-    else
-      members_.distances(extents_[cell].first, blocks_of(cell), mean_, keys_.data());
+    points_.distances(first_place(cell), extents_[cell].count, mean_, keys_.data());
     extents_[cell].radius = radius_of(
         *std::max_element(keys_.begin(), keys_.begin() + static_cast<std::ptrdiff_t>(extents_[cell].count)));
   }
 
   void put(std::size_t cell, PointId id, const std::uint8_t* codes) noexcept {
     const std::size_t place = extents_[cell].place() + extents_[cell].count++;
-    if (coded()) {
-      rows_.set(place, codes);
-      means_.get(cell, coder_.mean.data());
-      coder_.encode(codebook_, codes);
-      codes_.set(place, coder_.point);
-    } else {
-      members_.set(place, codes);
-    }
+    points_.set(place, codes, means_, cell);
     ids_[place] = id;
     block_of_[id] = static_cast<std::uint32_t>(place / block_size);
   }
@@ -248,27 +212,13 @@ private:
   /// Empty blocks behind all others, and the memory that a move needs. Returns the first.
   std::uint32_t append_blocks(std::size_t count) {
     const std::size_t first = blocks();
-    reserve(first + count);
+    points_.reserve(first + count);
     reserve_ahead(ids_, (first + count) * block_size);
     reserve_ahead(cell_of_, first + count);
-    if (coded()) {
-      codes_.resize(first + count);
-      rows_.resize((first + count) * block_size);
-    } else {
-      members_.resize(first + count);
-    }
+    points_.resize(first + count);
     ids_.resize((first + count) * block_size, no_point);
     cell_of_.resize(first + count, nowhere);
     return static_cast<std::uint32_t>(first);
-  }
-
-  void reserve(std::size_t blocks) {
-    if (coded()) {
-      codes_.reserve(blocks);
-      rows_.reserve(blocks * block_size);
-    } else {
-      members_.reserve(blocks);
-    }
   }
 
   /// For one more point.
@@ -279,7 +229,7 @@ private:
     const std::uint32_t first = append_blocks(room);
     Extent& extent = extents_[cell];
     for (std::size_t i = 0; i < extent.count; ++i) {
-      copy(extent.place() + i, std::size_t{first} * block_size + i);
+      points_.copy(extent.place() + i, std::size_t{first} * block_size + i);
       move_id(extent.place() + i, std::size_t{first} * block_size + i);
     }
     unused_ += extent.room;
@@ -301,32 +251,24 @@ private:
   /// All cells one after the other again.
   void compact() {
     const std::size_t left = blocks() - unused_;
-    ByteBlocks members(dim_, coded() ? 0 : left);
-    CodeBlocks codes = codes_.of_size(coded() ? left : 0);
-    ByteRows rows(dim_, coded() ? left * block_size : 0);
     std::vector<PointId> ids(left * block_size, no_point);
     std::vector<std::uint32_t> cell_of(left);
-    std::size_t next = 0;
-    for (std::size_t c = 0; c < size(); ++c) {
-      Extent& extent = extents_[c];
-      for (std::size_t i = 0; i < extent.count; ++i) {
-        if (coded()) {
-          codes.copy_from(codes_, extent.place() + i, next * block_size + i);
-          rows.set(next * block_size + i, rows_.row(extent.place() + i));
-        } else {
-          members.copy_from(members_, extent.place() + i, next * block_size + i);
+    points_.rearrange(left, [&](const auto& copy) {
+      std::size_t next = 0;
+      for (std::size_t c = 0; c < size(); ++c) {
+        Extent& extent = extents_[c];
+        for (std::size_t i = 0; i < extent.count; ++i) {
+          const std::size_t from = extent.place() + i, to = next * block_size + i;
+          copy(from, to);
+          ids[to] = ids_[from];
+          block_of_[ids[to]] = static_cast<std::uint32_t>(to / block_size);
         }
-        ids[next * block_size + i] = ids_[extent.place() + i];
-        block_of_[ids[next * block_size + i]] = static_cast<std::uint32_t>(next + i / block_size);
+        extent.first = static_cast<std::uint32_t>(next);
+        std::fill_n(cell_of.begin() + static_cast<std::ptrdiff_t>(next), extent.room,
+                    static_cast<std::uint32_t>(c));
+        next += extent.room;
       }
-      extent.first = static_cast<std::uint32_t>(next);
-      std::fill_n(cell_of.begin() + static_cast<std::ptrdiff_t>(next), extent.room,
-                  static_cast<std::uint32_t>(c));
-      next += extent.room;
-    }
-    members_ = std::move(members);
-    codes_ = std::move(codes);
-    rows_ = std::move(rows);
+    });
     ids_ = std::move(ids);
     cell_of_ = std::move(cell_of);
     unused_ = 0;
@@ -387,11 +329,7 @@ private:
 
   std::size_t dim_ = 0;
   ByteBlocks means_;
-  ByteBlocks members_;
-  ProductCodebook codebook_;
-  CodeBlocks codes_;
-  ByteRows rows_;
-  float spread_ = 1;
+  CellPoints points_;
   std::vector<PointId> ids_;  ///< of each place; no_point where there is none
   std::vector<Extent> extents_;
   std::vector<std::uint32_t> block_of_;  ///< of each id
@@ -402,93 +340,9 @@ private:
   ByteQuery mean_;
   std::vector<std::int32_t> keys_;
   std::vector<std::uint8_t> split_;
-  CodeWriter coder_;
   std::vector<PointId> moving_;
   KMeans halves_;
   Extent spare_{};
 };
-
-template <class RowOf>
-void ByteCells::learn_codes(const RowOf& row_of, unsigned threads) {
-  constexpr std::size_t most = 4096;  // differences to learn from
-  std::size_t points = 0;
-  for (const Extent& extent : extents_) points += extent.count;
-  const std::size_t step = std::max<std::size_t>(1, points / most);
-  std::vector<float> origin(dim_, 0), sample;
-  std::vector<std::uint8_t> mean(dim_), scratch(dim_);
-  std::size_t counted = 0;
-  for (std::size_t c = 0; c < size(); ++c) {
-    means_.get(c, mean.data());
-    for (std::size_t a = 0; a < dim_; ++a)
-      origin[a] += static_cast<float>(mean[a]) / static_cast<float>(size());
-    for (std::size_t i = 0; i < extents_[c].count; ++i)
-      if (counted++ % step == 0) {
-        const std::uint8_t* row = row_of(extents_[c].place() + i, scratch.data());
-        for (std::size_t a = 0; a < dim_; ++a) sample.push_back(static_cast<float>(row[a] - mean[a]));
-      }
-  }
-  ProductCodebook codebook(dim_, origin, sample, threads);
-  CodeWriter writer(codebook);
-  Spread spread = measure_spread(codebook, row_of);
-  CodeBlocks codes(codebook.groups(), blocks(), spread.largest_number, spread.largest_missed);
-  ByteRows rows(dim_, ids_.size());
-  parallel_for(size(), threads, [&](std::size_t begin, std::size_t end) {
-    CodeWriter mine(codebook);
-    std::vector<std::uint8_t> bytes(dim_);
-    for (std::size_t c = begin; c < end; ++c) {
-      means_.get(c, mine.mean.data());
-      for (std::size_t i = 0; i < extents_[c].count; ++i) {
-        const std::size_t place = extents_[c].place() + i;
-        const std::uint8_t* row = row_of(place, bytes.data());
-        mine.encode(codebook, row);
-        codes.set(place, mine.point);
-        rows.set(place, row);
-      }
-    }
-  });
-  codebook_ = std::move(codebook);
-  codes_ = std::move(codes);
-  rows_ = std::move(rows);
-  coder_ = std::move(writer);
-  spread_ = spread.of_products;
-}
-
-template <class RowOf>
-ByteCells::Spread ByteCells::measure_spread(const ProductCodebook& codebook, const RowOf& row_of) const {
-  constexpr std::size_t queries = 64;
-  CodeWriter writer(codebook);
-  ByteQuery query;
-  std::vector<std::uint8_t> row(dim_), bytes(dim_);
-  std::vector<std::int32_t> keys(means_.blocks() * block_size);
-  double sum = 0, terms = 0;
-  Spread spread;
-  for (std::size_t i = 0; i < std::min(queries, size()); ++i) {
-    const std::size_t own = i * size() / std::min(queries, size());
-    const std::uint8_t* point = row_of(extents_[own].place(), row.data());
-    query.set(point, dim_);
-    means_.distances(0, means_.blocks(), query, keys.data());
-    if (size() > 1) keys[own] = std::numeric_limits<std::int32_t>::max();
-    const auto next = static_cast<std::size_t>(
-        std::min_element(keys.begin(), keys.begin() + static_cast<std::ptrdiff_t>(size())) - keys.begin());
-    means_.get(next, writer.mean.data());
-    for (std::size_t k = 0; k < extents_[next].count; ++k) {
-      const std::uint8_t* other = row_of(extents_[next].place() + k, bytes.data());
-      writer.encode(codebook, other);
-      spread.largest_number = std::max(spread.largest_number, 1.5F * std::abs(writer.point.number));
-      spread.largest_missed = std::max(spread.largest_missed, 1.5F * writer.point.missed);
-      double product = 0, square = 0;
-      for (std::size_t a = 0; a < dim_; ++a) {
-        const double apart = point[a] - other[a];
-        product += apart * double{writer.missed()[codebook.place_of(a)]};
-        square += apart * apart;
-      }
-      const double both = square * double{writer.point.missed} * double{writer.point.missed};
-      if (both > 0) sum += product * product / both;
-      terms += both > 0;
-    }
-  }
-  if (terms > 0) spread.of_products = static_cast<float>(std::sqrt(sum / terms));
-  return spread;
-}
 
 }}}  // namespace cairn::CAIRN_ABI::detail

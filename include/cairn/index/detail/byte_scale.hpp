@@ -23,7 +23,6 @@
 #include <vector>
 
 #include <cairn/index/detail/block_lanes.hpp>
-#include <cairn/index/detail/byte_blocks.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 

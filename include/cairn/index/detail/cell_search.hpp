@@ -17,9 +17,13 @@
 #include <vector>
 
 #include <cairn/index/collectors.hpp>
+#include <cairn/index/detail/block_lanes.hpp>
 #include <cairn/index/detail/byte_blocks.hpp>
 #include <cairn/index/detail/byte_cells.hpp>
-#include <cairn/index/detail/product_codes.hpp>
+#include <cairn/index/detail/byte_kernels.hpp>
+#include <cairn/index/detail/code_kernels.hpp>
+#include <cairn/index/detail/code_tables.hpp>
+#include <cairn/index/detail/smallest_first.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
@@ -40,7 +44,7 @@ public:
     pending_.clear();
     doubts_.clear();
     looked_at_ = 0;
-    if (cells.coded()) cells.codebook().make_tables(query.data(), tables_);
+    if (cells.coded()) cells.points().codebook().make_tables(query.data(), tables_);
     const bool all = scan_cells(cells, blocks, offer, done);
     measure_pending(cells, offer);
     if (all) {
@@ -85,7 +89,7 @@ private:
     for (const std::size_t end = block + count; block < end;) {
       const std::size_t now = std::min(at_once, end - block);
       const PointId* ids = cells.ids_of(block);
-      cells.members().distances(block, now, query_, distances);
+      cells.points().members().distances(block, now, query_, distances);
       if (offer.unlimited()) {
         for (std::size_t i = 0; i < now * block_size; ++i)
           if (ids[i] == no_point) distances[i] = std::numeric_limits<std::int32_t>::max();
@@ -100,9 +104,9 @@ private:
   static void prefetch(const ByteCells& cells, std::size_t cell) noexcept {
     const std::size_t first = cells.first_block(cell), count = cells.blocks_of(cell);
     if (cells.coded()) {
-      cells.codes().prefetch(first, count);
+      cells.points().codes().prefetch(first, count);
     } else {
-      cells.members().prefetch(first, count);
+      cells.points().members().prefetch(first, count);
     }
   }
 
@@ -117,7 +121,7 @@ private:
     CodeVerdict verdicts[at_once];
     for (const std::size_t end = block + count; block < end;) {
       const std::size_t now = std::min(at_once, end - block);
-      cells.codes().estimates(block, now, tables_, scale_of(cells, cell.key), estimates);
+      cells.points().codes().estimates(block, now, tables_, scale_of(cells, cell.key), estimates);
       for (std::size_t place = end_of_points; place < (block + now) * block_size; ++place)
         estimates[place - block * block_size] = std::numeric_limits<float>::infinity();
       measure_pending(cells, offer);
@@ -126,7 +130,7 @@ private:
           pending_.push_back(static_cast<std::uint32_t>(block * block_size + i));
           measure_pending(cells, offer);
         });
-      cells.codes().verdicts(block, now, estimates, limits_of(cells, cell.key, offer), verdicts);
+      cells.points().codes().verdicts(block, now, estimates, limits_of(cells, cell.key, offer), verdicts);
       for (std::size_t i = 0; i < now; ++i, ++block) {
         ask_for(cells, block, verdicts[i].likely);
         if (const unsigned doubtful = verdicts[i].possible & ~verdicts[i].likely)
@@ -156,8 +160,9 @@ private:
     float estimates[block_size];
     CodeVerdict verdict{};
     for (const Doubt& doubt : doubts_) {
-      cells.codes().estimates(doubt.block, 1, tables_, scale_of(cells, doubt.key), estimates);
-      cells.codes().verdicts(doubt.block, 1, estimates, limits_of(cells, doubt.key, offer), &verdict);
+      cells.points().codes().estimates(doubt.block, 1, tables_, scale_of(cells, doubt.key), estimates);
+      cells.points().codes().verdicts(doubt.block, 1, estimates, limits_of(cells, doubt.key, offer),
+                                      &verdict);
       if (pending_.size() >= at_once) measure_pending(cells, offer);
       ask_for(cells, doubt.block, verdict.possible & doubt.lanes);
     }
@@ -165,21 +170,21 @@ private:
   }
 
   [[nodiscard]] CodeScale scale_of(const ByteCells& cells, std::int32_t key) const noexcept {
-    return cells.codes().scale(static_cast<float>(key), tables_);
+    return cells.points().codes().scale(static_cast<float>(key), tables_);
   }
   template <class Offer>
   [[nodiscard]] CodeLimits limits_of(const ByteCells& cells, std::int32_t key,
                                      const Offer& offer) const noexcept {
     const float below = static_cast<float>(offer.below()) * 1.000001F;
     const float proven = 2 * std::sqrt(below) * 1.00001F;
-    const float likely = std::clamp(likely_spreads * cells.spread(), 0.001F, 1.0F) * proven;
-    return {likely, proven, cells.codes().rounding(static_cast<float>(key), tables_), below};
+    const float likely = std::clamp(likely_spreads * cells.points().spread(), 0.001F, 1.0F) * proven;
+    return {likely, proven, cells.points().codes().rounding(static_cast<float>(key), tables_), below};
   }
 
   void ask_for(const ByteCells& cells, std::size_t block, unsigned lanes) {
     for (; lanes != 0; lanes &= lanes - 1) {
       const std::size_t place = block * block_size + static_cast<std::size_t>(std::countr_zero(lanes));
-      cells.rows().prefetch(place);
+      cells.points().rows().prefetch(place);
       pending_.push_back(static_cast<std::uint32_t>(place));
     }
   }
@@ -189,7 +194,7 @@ private:
     if (pending_.empty()) return;
     looked_at_ += pending_.size();
     distances_.resize(pending_.size());
-    cells.rows().distances(pending_.data(), pending_.size(), query_, distances_.data());
+    cells.points().rows().distances(pending_.data(), pending_.size(), query_, distances_.data());
     for (std::size_t i = 0; i < pending_.size(); ++i)
       if (distances_[i] < offer.below()) offer.prefetch(cells.id_of(pending_[i]));
     for (std::size_t i = 0; i < pending_.size(); ++i)

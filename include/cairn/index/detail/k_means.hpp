@@ -20,7 +20,9 @@
 
 #include <cairn/core/parallel.hpp>
 #include <cairn/index/detail/byte_blocks.hpp>
+#include <cairn/index/detail/byte_kernels.hpp>
 #include <cairn/index/detail/kd_split.hpp>
+#include <cairn/index/detail/smallest_first.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
