@@ -26,9 +26,11 @@ enum class Shed {
   tidying,  ///< old and twin landmarks leave another time; of a loop that closes its worth is not computed
   points,   ///< fewer interest points than were asked for, the strongest
   second_look,  ///< no search where landmarks must be
+  patches,      ///< landmarks are where keypoints are found, not where their surface is
   keyframe      ///< put off, unless that was done until much less is known
 };
-inline constexpr std::array<const char*, 4> shed_names{"tidying", "points", "second_look", "keyframe"};
+inline constexpr std::array<const char*, 5> shed_names{"tidying", "points", "second_look", "patches",
+                                                       "keyframe"};
 using ShedSet = std::bitset<shed_names.size()>;
 
 struct FrameBudgetOptions {

@@ -12,6 +12,12 @@
 
 namespace stereo_slam {
 
+/// What says where the landmarks of a frame are.
+enum class Places {
+  patches,   ///< the surface around them (surface_patch.hpp)
+  keypoints  ///< the points that were found on it
+};
+
 /// Two running means over the frames; the sigma given counts as some frames.
 ///
 /// Pixels, for gates: the median chi^2 of the matches that agree over that of four degrees of freedom. Only
@@ -21,27 +27,23 @@ namespace stereo_slam {
 /// the image have in common shows in it; what the whole image has in common the pose has absorbed, such as
 /// what a surface that is no plane does to all patches as the camera comes nearer. Measured on the rendered
 /// arena, where the truth is known, the variance of poses is 1.5 times what they say on the spot, and about
-/// 2.5 where the viewpoint changes (by 2 % of the distance and more between keyframes). A rig that has to be
-/// estimated goes without patches, and keypoints of a surface all wander the same way as the camera comes
-/// nearer: 6.
+/// 2.5 where the viewpoint changes (by 2 % of the distance and more between keyframes). Keypoints of a
+/// surface all wander the same way as the camera comes nearer: 6 where these say where landmarks are.
 class NoiseFactors {
 public:
   /// What the factor of poses comes to where the camera moves.
-  static constexpr double exact_rig = 2.5, estimated_rig = 6;
+  static constexpr double by_patches = 2.5, by_keypoints = 6;
 
   NoiseFactors() = default;
   /// Goes on from factors that were found before.
   NoiseFactors(double pixels, double poses) : pixels_(given * pixels), poses_(given * poses) {}
 
-  /// From now on the rig is estimated.
-  void estimate_rig() noexcept { moving_ = estimated_rig; }
-
   /// Takes a frame; returns its median chi^2 over what it should be.
-  double observe(const cairn::MapLocation& frame) {
+  double observe(const cairn::MapLocation& frame, Places places) {
     const double fit = frame.median_chi_squared / median_;
     count_ += 1;
     pixels_ += fit;
-    poses_ += unseen(frame.viewpoint_change) * frame.score_variance;
+    poses_ += unseen(frame.viewpoint_change, places) * frame.score_variance;
     return fit;
   }
 
@@ -51,13 +53,13 @@ public:
 private:
   static constexpr double given = 5;  // frames that the sigma given is worth
   /// Variance of a pose over what the scores say.
-  [[nodiscard]] double unseen(double viewpoint_change) const noexcept {
+  [[nodiscard]] static double unseen(double viewpoint_change, Places places) noexcept {
     constexpr double on_the_spot = 1.5, change = 0.02;
+    const double moving = places == Places::patches ? by_patches : by_keypoints;
     const double x = viewpoint_change / change;
-    return on_the_spot + (moving_ - on_the_spot) * x * x / (1 + x * x);
+    return on_the_spot + (moving - on_the_spot) * x * x / (1 + x * x);
   }
 
-  double moving_ = exact_rig;
   double median_ = cairn::chi_square_quantile(0.5, 4);
   double pixels_ = given, poses_ = given, count_ = given;
 };

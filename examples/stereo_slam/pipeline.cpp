@@ -10,10 +10,12 @@
 #include <utility>
 
 #include <cairn/core/cholesky.hpp>
+#include <cairn/core/parallel.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/io/text.hpp>
 
 #include "stopwatch.hpp"
+#include "surface_patch.hpp"
 
 namespace stereo_slam {
 namespace {
@@ -87,7 +89,6 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options, 
     cairn::raise(name + ": this map estimates its rig, which cannot be followed as drifting besides");
   map_ = std::move(known.map);
   noise_factors_ = NoiseFactors(map_.pixel_factor(), map_.pose_factor());
-  if (map_.rig_correction()) noise_factors_.estimate_rig();
   step_ = known.steps;
   for (Landmark& landmark : known.landmarks) {
     landmark.id = store_->add({landmark.descriptor, landmark.sign});
@@ -231,8 +232,7 @@ void Pipeline::choose_calibration() {
   cairn::KeyframeMapOptions with_rig = map_options(options_);
   // The map takes pixels for independent and multiplies its covariances by how much they are not. What is
   // known beforehand of the rig is put on the same scale.
-  noise_factors_.estimate_rig();
-  with_rig.rig = options_.rig.scaled(1 / std::sqrt(NoiseFactors::estimated_rig));
+  with_rig.rig = options_.rig.scaled(1 / std::sqrt(NoiseFactors::by_keypoints));
   map_ = cairn::KeyframeMap(rig_, with_rig);
 }
 
@@ -268,8 +268,7 @@ void Pipeline::follow(const StereoFrame& frame, FrameRecord& result) {
     if (!options_.localise) if_time(Shed::tidying, [&] { age(*located); });
     close_step();
   });
-  if (options_.calibrate == Calibration::drifting)
-    timed(result, Stage::update, [&] { calibrate(located->agreed); });
+  if (options_.calibrate == Calibration::drifting) timed(result, Stage::update, [&] { calibrate(*located); });
 }
 
 /// A frame that is nowhere: the camera is where its motion leads, as long as that is known.
@@ -348,13 +347,16 @@ std::optional<Pipeline::Located> Pipeline::locate(std::vector<Match>& matches) {
   if (!pose.good()) return std::nullopt;
   expected_.clear();
   if_time(Shed::second_look, [&] { look_again(pose, matches); });
-  settle(pose, matches);
   Located located;
   located.sightings = sightings(matches);
+  located.places = settle(pose.T_world_camera, matches, located.sightings);
   located.location = map_.locate(pose.T_world_camera, located.sightings);
   if (!located.location.good()) return std::nullopt;
-  for (std::size_t i = 0; i < matches.size(); ++i)
-    if (located.location.inliers[i] != 0) located.agreed.push_back(matches[i]);
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (located.location.inliers[i] == 0) continue;
+    located.agreed.push_back(matches[i]);
+    located.agreed_sightings.push_back(located.sightings[i]);
+  }
   if (lost_ && located.agreed.size() < options_.relocating_inliers) return std::nullopt;
   return located;
 }
@@ -389,28 +391,49 @@ std::vector<Pipeline::Match> Pipeline::within_reach(const std::vector<Match>& ma
   return near;
 }
 
-/// Local landmarks move to where what their landmark looked like at first is now.
-void Pipeline::settle(const cairn::StereoPose& pose, const std::vector<Match>& matches) {
-  const cairn::SE3 T_camera_world = pose.T_world_camera.inverse();
-  for (const Match& match : matches) {
-    LocalLandmark& local = locals_[match.local];
-    const std::shared_ptr<const SurfacePatch>& patch = landmarks_[match.landmark].patch;
-    if (!patch) continue;
-    local.sigma *= std::numbers::sqrt2;  // the landmark's own place is that of its patch
-    if (!local.pair.refined) continue;
+/// Landmarks that were born with a patch are seen where that is now. What its keypoint says is off by as much
+/// as the one that it was born at was, twice the variance: that remains where the patch is not found, and
+/// where there is no time to look for it. Returns what says where most are.
+Places Pipeline::settle(const cairn::SE3& T_world_camera, std::span<const Match> matches,
+                        std::span<cairn::StereoSighting> sightings) {
+  struct Search {
+    std::size_t match;
+    const SurfacePatch* patch;
+    cairn::SE3 T_now_then;
+    double inverse_depth;  // then
+    std::optional<FoundPatch> found;
+  };
+  std::vector<Search> searches;
+  const cairn::SE3 T_camera_world = T_world_camera.inverse();
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const SurfacePatch* const patch = landmarks_[matches[i].landmark].patch.get();
+    if (patch == nullptr) continue;
+    sightings[i].sigma *= std::numbers::sqrt2;
+    if (!locals_[matches[i].local].pair.refined) continue;
     const auto T_world_then = map_.keyframe_pose(patch->keyframe);
-    const auto landmark = map_.landmark(match.landmark);
+    const auto landmark = map_.landmark(matches[i].landmark);
     if (!T_world_then || !landmark) continue;
     const double depth = (T_world_then->inverse() * landmark->mean)(2);
-    if (!(depth > 0)) continue;
-    const auto found =
-        find_patch(*patch, rig_.left, T_camera_world * *T_world_then, 1 / depth, image_, local.left_pixel);
-    if (!found || found->correlation < options_.stereo.min_correlation) continue;
-    const cairn::Vector<2> step = found->pixel - local.left_pixel;
-    local.left_pixel = found->pixel;
-    local.right_pixel += local.pair.right_step(step);
-    local.sigma = std::hypot(options_.patch_sigma, found->sigma);
+    if (depth > 0) searches.push_back({i, patch, T_camera_world * *T_world_then, 1 / depth, std::nullopt});
   }
+  if (searches.empty()) return Places::keypoints;
+  std::size_t settled = 0;
+  if_time(Shed::patches, [&] {
+    cairn::parallel_for(searches.size(), options_.threads, [&](std::size_t begin, std::size_t end) {
+      for (Search& one : std::span(searches).subspan(begin, end - begin))
+        one.found = find_patch(*one.patch, rig_.left, one.T_now_then, one.inverse_depth, image_,
+                               sightings[one.match].left);
+    });
+    for (const Search& one : searches) {
+      if (!one.found || one.found->correlation < options_.stereo.min_correlation) continue;
+      cairn::StereoSighting& seen = sightings[one.match];
+      seen.right += locals_[matches[one.match].local].pair.right_step(one.found->pixel - seen.left);
+      seen.left = one.found->pixel;
+      seen.sigma = std::hypot(options_.patch_sigma, one.found->sigma);
+      ++settled;
+    }
+  });
+  return 2 * settled > matches.size() ? Places::patches : Places::keypoints;
 }
 
 /// Landmarks that the keyframes in play saw, and no local one is taken for yet, are searched for where the
@@ -450,7 +473,7 @@ void Pipeline::move_to(const Located& located, FrameRecord& result) {
   lost_ = false;
   T_world_camera_ = here.T_world_camera;
   pose_covariance_ = here.covariance;
-  result.fit = noise_factors_.observe(here);
+  result.fit = noise_factors_.observe(here, located.places);
   map_.set_variance_factors(noise_factors_.pixels(), noise_factors_.poses());
   for (const Match& match : located.agreed) {
     Landmark& landmark = landmarks_[match.landmark];
@@ -485,7 +508,7 @@ void Pipeline::make_keyframe(const Located& located, const StereoFrame& frame, F
 void Pipeline::add_landmarks(const std::vector<Match>& known, const StereoFrame& frame) {
   // A patch says where its landmark is to a twentieth of a pixel, and lenses that are wrong by more do not
   // let it: on a recorded drive that nothing was chosen on, patches doubled the error.
-  const bool with_patches = !map_.rig_correction();
+  const bool with_patches = options_.patches && !map_.rig_correction();
   std::vector<std::uint8_t> taken(locals_.size(), 0);
   for (const Match& match : known) taken[match.local] = 1;
   for (std::uint32_t i = 0; i < locals_.size(); ++i) {
@@ -498,9 +521,10 @@ void Pipeline::add_landmarks(const std::vector<Match>& known, const StereoFrame&
                                         match_stereo_->slope_of_inverse_depth(locals_[i].pair),
                                         map_.keyframes_added() - 1))
         landmark.patch = std::make_shared<const SurfacePatch>(*patch);
-    if (landmark.patch) locals_[i].sigma = options_.patch_sigma;
     landmark.id = store_->add({look, point.laplacian});
-    if (!map_.add_landmark(sighting(i, landmark.id))) {
+    cairn::StereoSighting seen = sighting(i, landmark.id);
+    if (landmark.patch) seen.sigma = options_.patch_sigma;
+    if (!map_.add_landmark(seen)) {
       store_->erase(landmark.id);
       continue;
     }
@@ -548,12 +572,12 @@ void Pipeline::note_loop(const Located& located) {
   std::vector<int> away;
   std::vector<double> back;
   std::vector<cairn::StereoSighting> others;
-  for (const Match& match : located.agreed) {
-    away.push_back(step_ - landmarks_[match.landmark].last_seen);
+  for (const cairn::StereoSighting& seen : located.agreed_sightings) {
+    away.push_back(step_ - landmarks_[seen.landmark].last_seen);
     if (loop_watch_.comes_back(away.back()))
       back.push_back(away.back());
     else
-      others.push_back(sighting(match.local, match.landmark));
+      others.push_back(seen);
   }
   if (!loop_watch_.observe(step_, away) || lost_) return;
   LoopClosure loop{record_.frames.size() - 1, back.size(), 0, std::nullopt};
@@ -628,13 +652,11 @@ void Pipeline::merge_twins(const Located& located) {
 }
 
 /// What the landmarks' motion in the images says of the rig.
-void Pipeline::calibrate(const std::vector<Match>& agreed) {
+void Pipeline::calibrate(const Located& located) {
   std::vector<Sighting> seen;
-  seen.reserve(agreed.size());
-  for (const Match& match : agreed) {
-    const LocalLandmark& local = locals_[match.local];
-    seen.push_back({match.landmark, local.left_pixel, local.right_pixel, local.sigma});
-  }
+  seen.reserve(located.agreed_sightings.size());
+  for (const cairn::StereoSighting& one : located.agreed_sightings)
+    seen.push_back({one.landmark, one.left, one.right, one.sigma});
   if (calibration_.observe(T_world_camera_, std::move(seen))) take_rig(calibration_.rig());
 }
 

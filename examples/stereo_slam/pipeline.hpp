@@ -78,6 +78,9 @@ struct PipelineOptions {
 
   double pixel_sigma = 0.35;     ///< noise of the coordinates of a point of scale 1 [pixels]
   double scale_exponent = 0.65;  ///< it grows with this power of the scale
+  /// Where the rig is exactly known landmarks are where their surface is (surface_patch.hpp), not where a
+  /// keypoint is found on it.
+  bool patches = true;
   double patch_sigma = 0.05;  ///< of a point whose patch was found again, besides what its residual implies
   FrameBudgetOptions budget;  ///< of the work on a frame; what it leaves out depends on the clock
   GuidedMatchingOptions second_look;
@@ -153,7 +156,9 @@ private:
   struct Located {
     cairn::MapLocation location;
     std::vector<cairn::StereoSighting> sightings;  ///< one a match
+    Places places = Places::keypoints;             ///< what says where most of them are
     std::vector<Match> agreed;
+    std::vector<cairn::StereoSighting> agreed_sightings;
   };
 
   void work_on(const StereoFrame& frame, const FramePoints& points, FrameRecord& result);
@@ -183,11 +188,12 @@ private:
   void merge_twins(const Located& located);
   void forget(LandmarkId id);
   [[nodiscard]] std::vector<cairn::SE3> corrected_path() const;
-  void calibrate(const std::vector<Match>& agreed);
+  void calibrate(const Located& located);
   void take_rig(const cairn::StereoRig& rig);
   void look_through(const cairn::StereoRig& rig);
 
-  void settle(const cairn::StereoPose& pose, const std::vector<Match>& matches);
+  [[nodiscard]] Places settle(const cairn::SE3& T_world_camera, std::span<const Match> matches,
+                              std::span<cairn::StereoSighting> sightings);
   void look_again(const cairn::StereoPose& pose, std::vector<Match>& matches);
   void earliest_first(std::vector<Match>& matches) const;
   [[nodiscard]] std::vector<cairn::StereoMatch> observations(std::vector<Match>& matches);

@@ -287,7 +287,7 @@ std::optional<example::Table> budget_table(const Summary& summary) {
   constexpr std::array<const char*, shed_names.size()> meanings{
       "old and twin landmarks were kept for longer, the worth of a loop was not computed",
       "fewer interest points than asked for", "no search for landmarks where they must be",
-      "a keyframe was put off"};
+      "landmarks were where keypoints were found, not where their surface was", "a keyframe was put off"};
   example::Table table{.title = "What the budget left out",
                        .caption = "Missed least first. " + std::to_string(summary.budget->frames_over) +
                                   " frames took longer than the budget all the same.",

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include "pipeline.hpp"
 
+#include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -69,7 +71,9 @@ RunRecord run(const std::vector<StereoFrame>& frames, const PipelineOptions& wit
 bool same_bits(const RunRecord& a, const RunRecord& b) {
   if (a.frames.size() != b.frames.size() || a.landmarks.size() != b.landmarks.size()) return false;
   for (std::size_t i = 0; i < a.frames.size(); ++i)
-    if (a.frames[i].T_world_camera.matrix() != b.frames[i].T_world_camera.matrix()) return false;
+    if (a.frames[i].T_world_camera.matrix() != b.frames[i].T_world_camera.matrix() ||
+        a.frames[i].covariance != b.frames[i].covariance)
+      return false;
   for (std::size_t i = 0; i < a.landmarks.size(); ++i)
     if (a.landmarks[i].position != b.landmarks[i].position) return false;
   return true;
@@ -157,6 +161,7 @@ TEST_SUITE("pipeline") {
       if (frame.index == 0) continue;
       CHECK(left_out(frame, Shed::tidying));
       CHECK(left_out(frame, Shed::second_look));
+      CHECK(left_out(frame, Shed::patches));
       put_off += left_out(frame, Shed::keyframe) ? 1 : 0;
       keyframes += frame.keyframe ? 1 : 0;
     }
@@ -166,6 +171,8 @@ TEST_SUITE("pipeline") {
     CHECK(record.merged == 0);
     CHECK(record.aged == 0);
     CHECK(same_bits(record, run(drive(), hurried)));  // nothing is ever in time
+    hurried.patches = false;                          // nobody does without what there is none of
+    for (const FrameRecord& frame : run(drive(), hurried).frames) CHECK_FALSE(left_out(frame, Shed::patches));
   }
 
   TEST_CASE("pipeline: a budget that is never used up changes no bit") {

@@ -387,6 +387,7 @@ TEST_SUITE("program") {
       CHECK(budget["fewest_points"] >= 300);
       CHECK(budget["shed"]["tidying"] == 15);
       CHECK(budget["shed"]["second_look"] == 15);
+      CHECK(budget["shed"]["patches"] == 15);
       CHECK(budget["shed"]["keyframe"] < 15);
       if (example::has_report_page())
         CHECK(cairn::read_file(folder / "hurried" / "report.html").find("What the budget left out") !=

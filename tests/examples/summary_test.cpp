@@ -226,7 +226,7 @@ TEST_CASE("summary: what a budget left out is counted by kind, and without one n
       {"ms", 20.0},
       {"frames_over", 1},
       {"frames_shed", 3},
-      {"shed", {{"tidying", 1}, {"points", 2}, {"second_look", 1}, {"keyframe", 0}}},
+      {"shed", {{"tidying", 1}, {"points", 2}, {"second_look", 1}, {"patches", 0}, {"keyframe", 0}}},
       {"fewest_points", 800}};
   CHECK(json_of(run)["budget"] == expected);
   CHECK(stereo_slam::budget_text(*stereo_slam::summarise(run).budget) ==
