@@ -62,6 +62,22 @@ TEST_SUITE("eval/relations") {
     CHECK(relation_error(path, {}).count == 0);
   }
 
+  TEST_CASE("relations: poses without a time are as if they were not there") {
+    std::vector<StampedPose2> path;
+    for (int i = 0; i < 1000; ++i) {
+      const double time = (i * 7919) % 1000;  // each once
+      path.push_back({time, SE2(time, 0, 0)});
+      if (i % 3 == 0) path.push_back({std::nan(""), SE2()});
+    }
+    std::vector<PoseRelation> relations;
+    for (int i = 0; i + 1 < 1000; ++i) relations.push_back({i * 1.0, i + 1.0, SE2(1, 0, 0)});
+    const RelationError error = relation_error(path, relations);
+    CHECK(error.count == relations.size());
+    CHECK(error.largest == 0);
+    relations.push_back({std::nan(""), 1, SE2()});
+    CHECK(relation_error(path, relations).missing == 1);
+  }
+
   TEST_CASE("relations: bad files are refused with the line") {
     const cairn_test::Folder folder;
     folder.put("short", "1 2 0 0 0 0 0\n");

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include <Eigen/LU>
@@ -149,6 +150,25 @@ TEST_SUITE("trajectory_error") {
     CHECK_FALSE(cairn::relative_error(pairs, {.delta = 500, .unit = cairn::DeltaUnit::metres}).has_value());
   }
 
+  TEST_CASE("relative_error: a distance that is lost beside the path's own leads from each pose to the next") {
+    std::vector<PosePair> pairs;
+    for (int i = 0; i < 5; ++i) {
+      const SE3 pose(SO3(), Vector<3>(1e6 * i, 0, 0));
+      pairs.push_back({static_cast<double>(i), pose, pose});
+    }
+    pairs.insert(pairs.begin() + 2, pairs[2]);  // which stands still there
+    for (const bool all : {false, true}) {
+      const auto listed = cairn::detail::relative_pairs(
+          pairs, {.delta = 1e-20, .unit = cairn::DeltaUnit::metres, .all_pairs = all, .tolerance = 1e30});
+      REQUIRE(listed.size() == 5);
+      for (std::size_t i = 0; i < 5; ++i) CHECK(listed[i] == std::pair(i, i + 1));
+    }
+    pairs[3].truth = SE3(SO3(), Vector<3>(std::nan(""), 0, 0));
+    for (const auto& [i, j] :
+         cairn::detail::relative_pairs(pairs, {.delta = 1, .unit = cairn::DeltaUnit::metres}))
+      CHECK(i < j);
+  }
+
   TEST_CASE("relative_error: poses anywhere have the error of the definition in matrices") {
     cairn::Random random(cairn_test::seed());
     std::vector<PosePair> pairs = random_pairs(random, 12);
@@ -165,6 +185,16 @@ TEST_SUITE("trajectory_error") {
     REQUIRE(error.has_value());
     CHECK(error->translation.sum_of_squares == doctest::Approx(squares).epsilon(1e-9));
     CHECK(error->rotation.mean == doctest::Approx(angles / 9).epsilon(1e-6));
+  }
+
+  TEST_CASE("associate: what has no time belongs to nothing") {
+    const double nan = std::nan("");
+    const Trajectory good{{0.0, SE3()}, {1.0, SE3()}}, bad{{0.0, SE3()}, {nan, SE3()}};
+    CHECK(cairn::associate(good, bad).size() == 1);
+    CHECK(cairn::associate(Trajectory{{nan, SE3()}}, good).empty());
+    CHECK(cairn::associate(good, good, {.offset = nan}).empty());
+    CHECK(cairn::associate(good, good, {.largest_difference = nan}).empty());
+    CHECK(cairn::associate(good, good).size() == 2);
   }
 
   TEST_CASE("associate: the earlier of two equally near, the first of two that want the same") {

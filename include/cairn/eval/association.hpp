@@ -32,7 +32,8 @@ struct AssociationOptions {
 
 /// Pairs every estimated pose with the pose of the truth that is nearest in time (the earlier of two equally
 /// near); where two estimates want the same one, the nearer has it (the first of two equally near) and the
-/// other is left out. Both trajectories are in the order of time. O((n + m) log m).
+/// other is left out. Both trajectories are in the order of time. Poses without a time (NaN) are of no pair.
+/// O((n + m) log m).
 [[nodiscard]] inline std::vector<PosePair> associate(const Trajectory& truth, const Trajectory& estimate,
                                                      const AssociationOptions& options = {}) {
   const auto before = [](const StampedPose& a, const StampedPose& b) { return a.time < b.time; };
@@ -51,7 +52,7 @@ struct AssociationOptions {
         (nearest != truth.begin() && time - (nearest - 1)->time <= nearest->time - time))
       --nearest;
     const double difference = std::abs(nearest->time - time);
-    if (difference > options.largest_difference) continue;
+    if (!(difference <= options.largest_difference)) continue;  // also where a time is none
     const auto index = static_cast<std::size_t>(nearest - truth.begin());
     const PosePair pair{pose.time, nearest->T_world_body, pose.T_world_body};
     if (index != taken)

@@ -76,15 +76,17 @@ inline void mean_and_deviation(std::span<const double> values, double& mean, dou
   deviation = std::sqrt(deviation);
 }
 
-/// The path's poses in the order of time; of several with the same time the first of the path stands.
+/// The path's poses in the order of time; of several with the same time the first of the path stands, and
+/// those whose time is no number nowhere.
 class PosesByTime {
 public:
   PosesByTime(std::span<const StampedPose2> path, double tolerance) : tolerance_(tolerance) {
     std::vector<std::pair<double, std::size_t>> order;
     order.reserve(path.size());
-    for (std::size_t i = 0; i < path.size(); ++i) order.emplace_back(path[i].time, i);
+    for (std::size_t i = 0; i < path.size(); ++i)
+      if (!std::isnan(path[i].time)) order.emplace_back(path[i].time, i);
     std::ranges::sort(order);
-    poses_.reserve(path.size());
+    poses_.reserve(order.size());
     for (const auto& [time, i] : order) poses_.push_back(path[i]);
   }
 

@@ -153,8 +153,10 @@ inline std::vector<std::pair<std::size_t, std::size_t>> relative_pairs(std::span
   const std::vector<double> distances = path_distances(pairs);
   for (std::size_t i = 0; i < pairs.size();) {
     const double wanted = distances[i] + options.delta;
-    auto end = std::lower_bound(distances.begin(), distances.end(), wanted);
-    if (options.all_pairs && end != distances.begin() &&
+    // Never the pose itself, also where delta is lost beside the distance.
+    const auto next = distances.begin() + static_cast<std::ptrdiff_t>(i) + 1;
+    auto end = std::lower_bound(next, distances.end(), wanted);
+    if (options.all_pairs && end != next &&
         (end == distances.end() || wanted - *(end - 1) < *end - wanted))
       --end;
     if (end == distances.end()) break;
