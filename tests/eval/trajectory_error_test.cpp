@@ -150,7 +150,8 @@ TEST_SUITE("trajectory_error") {
     CHECK_FALSE(cairn::relative_error(pairs, {.delta = 500, .unit = cairn::DeltaUnit::metres}).has_value());
   }
 
-  TEST_CASE("relative_error: a distance that is lost beside the path's own leads from each pose to the next") {
+  TEST_CASE(
+      "relative_error: a distance that is lost beside the path's own leads from each pose to the next") {
     std::vector<PosePair> pairs;
     for (int i = 0; i < 5; ++i) {
       const SE3 pose(SO3(), Vector<3>(1e6 * i, 0, 0));

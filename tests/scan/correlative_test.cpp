@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -71,6 +73,26 @@ TEST_SUITE("scan/correlative") {
       REQUIRE(std::abs(found->pose.x() - middle.x()) <= window.x + 1e-9);
       REQUIRE(std::abs(wrapped(found->pose.angle() - middle.angle())) <= window.angle + 1e-9);
     }
+  }
+
+  TEST_CASE(
+      "correlative: points that no lattice of headings holds are refused, a score of 1 is never exceeded") {
+    ScoreGrid grid({0.05, 0, 0}, {0, 0}, 40, 40);
+    grid(20, 20) = 255;
+    const CorrelativeSearch search(grid);
+    const SearchWindow window{0.1, 0.1, 0.1};
+    for (const double x : {1e9, 1e300, std::nan(""), std::numeric_limits<double>::infinity()}) {
+      const std::vector<ScanPoint> points{{1.02, 1.02}, {0, x}};
+      const std::string said =
+          cairn_test::message_of([&] { static_cast<void>(search.find(points, SE2(), window)); });
+      CHECK(said.find("less than 2^20 cells from the scanner") != std::string::npos);
+      CHECK_FALSE(cairn_test::message_of([&] { static_cast<void>(search.heading_step(points)); }).empty());
+    }
+    const std::vector<ScanPoint> points{{1.02, 1.02}};
+    REQUIRE(search.find(points, SE2(), window, 0.999).has_value());
+    CHECK(search.find(points, SE2(), window, 0.999)->score == 1);
+    for (const double least : {1.0, 2.0, 1e300, std::numeric_limits<double>::infinity()})
+      CHECK_FALSE(search.find(points, SE2(), window, least).has_value());
   }
 
   TEST_CASE(

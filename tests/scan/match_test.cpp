@@ -121,13 +121,27 @@ TEST_SUITE("scan/match") {
     CHECK(std::isfinite(log_likelihood(grid, points, SE2(1e15, 0, 0), {})));
   }
 
+  TEST_CASE("match: with the smallest sigma that a model may have all numbers are finite") {
+    OccupancyGrid grid;
+    grid.insert(SE2(), {{1, 1}, {1.05, 1}, {1.1, 1}, {1.15, 1}});
+    const EndPointModel sharp{.sigma = 1e-6};
+    REQUIRE(sharp.valid());
+    const std::vector<ScanPoint> points{{1, 1}, {1.07, 1.01}, {3, 3}, {1e3, -1e3}};
+    const ScanLikelihood at = evaluate(grid, points, SE2(), sharp);
+    CHECK(std::isfinite(at.log_likelihood));
+    CHECK(all_finite(at.gradient));
+    CHECK(all_finite(at.curvature));
+  }
+
   TEST_CASE("match: a model out of its ranges breaks its promise") {
     const OccupancyGrid grid;
     MatchOptions options;
-    options.model.sigma = 0;
-    CHECK_FALSE(cairn_test::violation_of([&] {
-                  static_cast<void>(match(grid, {}, SE2(), SE2(), Matrix<3>::Zero(), options));
-                }).empty());
+    for (const double sigma : {0.0, 1e-25, -1.0}) {  // the second's square is no float
+      options.model.sigma = sigma;
+      CHECK_FALSE(cairn_test::violation_of([&] {
+                    static_cast<void>(match(grid, {}, SE2(), SE2(), Matrix<3>::Zero(), options));
+                  }).empty());
+    }
   }
 }
 

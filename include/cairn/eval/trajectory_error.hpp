@@ -156,8 +156,7 @@ inline std::vector<std::pair<std::size_t, std::size_t>> relative_pairs(std::span
     // Never the pose itself, also where delta is lost beside the distance.
     const auto next = distances.begin() + static_cast<std::ptrdiff_t>(i) + 1;
     auto end = std::lower_bound(next, distances.end(), wanted);
-    if (options.all_pairs && end != next &&
-        (end == distances.end() || wanted - *(end - 1) < *end - wanted))
+    if (options.all_pairs && end != next && (end == distances.end() || wanted - *(end - 1) < *end - wanted))
       --end;
     if (end == distances.end()) break;
     const auto j = static_cast<std::size_t>(end - distances.begin());

@@ -74,9 +74,10 @@ struct HeightSpread {
     if (!(nu > 1)) return std::numeric_limits<double>::infinity();
     return std::sqrt(0.5 * squares) * std::exp(log_gamma(0.5 * (nu - 1)) - log_gamma(0.5 * nu));
   }
-  /// sigma [m] below which it lies with this probability, strictly between 0 and 1.
+  /// sigma [m] below which it lies with this probability, from 1e-15 to less than 1.
   [[nodiscard]] double sigma_quantile(double probability) const {
-    CAIRN_EXPECTS(probability > 0 && probability < 1, "sigma_quantile needs a probability between 0 and 1");
+    CAIRN_EXPECTS(probability >= 1e-15 && probability < 1,
+                  "sigma_quantile needs a probability between 1e-15 and 1");
     return std::sqrt(squares / chi_square_quantile(1 - probability, nu));
   }
 };

@@ -208,8 +208,8 @@ public:
   }
 
   /// The pose of the lattice around `middle` with the largest score above `least`; nothing where none is, or
-  /// there is no point. Throws Error on a window that is not finite or a middle too far from the grid's
-  /// origin.
+  /// there is no point. Throws Error on a window that is not finite, a middle too far from the grid's origin,
+  /// or points as heading_step().
   [[nodiscard]] std::optional<CorrelativeMatch> find(std::span<const ScanPoint> points, const SE2& middle,
                                                      const SearchWindow& window, double least = 0) const {
     return find_beside({}, {}, points, middle, window, least);
@@ -247,11 +247,17 @@ public:
     return points.empty() ? 0 : static_cast<double>(sum) / (255.0 * static_cast<double>(points.size()));
   }
 
-  /// Between neighbouring headings [rad]: the farthest point moves by less than a cell.
+  /// Between neighbouring headings [rad]: the farthest point moves by less than a cell. Throws Error on
+  /// points that are not finite, or 2^20 cells or more away.
   [[nodiscard]] double heading_step(std::span<const ScanPoint> points) const {
     const double cell = levels_.front().geometry().cell_size;
     double farthest = 3 * cell;
-    for (const ScanPoint& p : points) farthest = std::max(farthest, std::hypot(p.x, p.y));
+    for (const ScanPoint& p : points) {
+      const double away = std::hypot(p.x, p.y);
+      if (!(away < (1 << 20) * cell))
+        raise("CorrelativeSearch: expected finite points less than 2^20 cells from the scanner");
+      farthest = std::max(farthest, away);
+    }
     return std::acos(1 - 0.5 * cell * cell / (farthest * farthest));
   }
 
@@ -262,11 +268,11 @@ private:
                                                             const SE2& middle, const SearchWindow& window,
                                                             double least) const {
     check(middle, window);
-    if (points.empty()) return std::nullopt;
+    const double step = heading_step(points);
+    if (points.empty() || least >= 1) return std::nullopt;  // 1 is the largest score
     const GridGeometry& geometry = levels_.front().geometry();
     const int reach_x = static_cast<int>(window.x / geometry.cell_size);
     const int reach_y = static_cast<int>(window.y / geometry.cell_size);
-    const double step = heading_step(points);
     const int headings = static_cast<int>(window.angle / step);
     const double scale = 255.0 * static_cast<double>(points.size());
     long best = static_cast<long>(std::floor(std::max(0.0, least) * scale));

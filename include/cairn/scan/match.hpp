@@ -38,7 +38,7 @@ namespace cairn { inline namespace CAIRN_ABI {
 
 /// The model of a scan's end points in a distance field.
 struct EndPointModel {
-  double sigma = 0.03;     ///< of an end point across a wall of the map [m]
+  double sigma = 0.03;     ///< of an end point across a wall of the map, at least 1e-6 [m]
   double outliers = 0.05;  ///< e above, at least 1e-30
   /// u above: what an end point in a cell that no beam has entered is worth. Between e, by which scans would
   /// be drawn back to what is known, and 1, by which they would flee from it.
@@ -46,8 +46,8 @@ struct EndPointModel {
   double independence = 0.2;  ///< in (0, 1]
 
   [[nodiscard]] bool valid() const noexcept {
-    return sigma > 0 && std::isfinite(sigma) && outliers >= 1e-30 && outliers < 1 && unknown >= outliers &&
-           unknown <= 1 && independence > 0 && independence <= 1;
+    return sigma >= 1e-6 && std::isfinite(sigma) && outliers >= 1e-30 && outliers < 1 &&
+           unknown >= outliers && unknown <= 1 && independence > 0 && independence <= 1;
   }
 };
 
