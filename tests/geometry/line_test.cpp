@@ -351,6 +351,9 @@ TEST_SUITE("anchored line") {
     }
     const Line behind = Line::through({-1, 0, -5}, {1, 0, -5});
     CHECK_FALSE(cairn::AnchoredLine::at(SE3(), {{-0.2, 0}, {0.2, 0}}, behind));
+    const cairn::AnchoredLine parallel = cairn::AnchoredLine().with({0, 0, 0, 1});  // to its first ray
+    CHECK(std::isinf(parallel.sigma_across(0, cairn::Matrix<4>::Identity())));
+    CHECK(std::isfinite(parallel.sigma_across(1, cairn::Matrix<4>::Identity())));
     CHECK_FALSE(cairn::AnchoredLine::at(SE3(), {{0.1, 0}, {0.1, 0}}, Line::through({-1, 0, 5}, {1, 0, 5})));
   }
 

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 #include <cmath>
+#include <limits>
 
 #include <doctest/doctest.h>
 
@@ -110,6 +111,26 @@ TEST_SUITE("rig_correction") {
       CHECK((of_rig.E - J_point.transpose() * J_rig).norm() < most * of_rig.E.norm());
       CHECK((of_rig.D - J_rig.transpose() * J_rig).norm() < most * of_rig.D.norm());
       CHECK((of_rig.u - J_rig.transpose() * r).norm() < 5e-3 * (J_rig.norm() * r.norm()));
+    }
+  }
+
+  TEST_CASE("rig_correction: numbers of which no rig comes are refused") {
+    const cairn::RigCorrection correction(rig());
+    const double infinity = std::numeric_limits<double>::infinity();
+    for (int i = 0; i < cairn::rig_numbers; ++i)
+      for (const double bad : {std::nan(""), infinity, -infinity}) {
+        CAPTURE(i);
+        RigState state = RigState::Zero();
+        state(i) = bad;
+        CHECK_THROWS_AS(static_cast<void>(correction.rig(state)), cairn::Error);
+        if (i < 5)
+          CHECK_THROWS_AS(static_cast<void>(correction.rig(cairn::RigCorrection::loose(state))),
+                          cairn::Error);
+      }
+    RigState long_baseline = RigState::Zero();
+    for (const double log_length : {800.0, -800.0}) {  // whose factor is infinite, or nothing
+      long_baseline(5) = log_length;
+      CHECK_THROWS_AS(static_cast<void>(correction.rig(long_baseline)), cairn::Error);
     }
   }
 }

@@ -96,6 +96,12 @@ TEST_SUITE("io/carmen") {
     CHECK(words_of("FLASER 1 1 0 0 0 0 0 x 1 h 0\n").find("the robot's pose") != std::string::npos);
     CHECK(words_of("ROBOTLASER1 0 0 0 0 30 0 0 1 1 0 0 0 0 0 0 0 0 0 0 0 x\n").find("turning axis") !=
           std::string::npos);
+    for (const char* farthest : {"0", "-5"}) {  // every beam would be none, or go backwards
+      const std::string line =
+          "ROBOTLASER1 0 -1 2 0.5 " + std::string(farthest) + " 0 0 1 1 0 0 0 0 0 0 0 0 0 0 0 0 1 h 1\n";
+      CHECK(words_of(line).find("the largest range: a number above zero ('" + std::string(farthest) + "'") !=
+            std::string::npos);
+    }
     CHECK(words_of("FLASER\n").find("number of ranges") != std::string::npos);
     const cairn_test::Folder folder;
     CHECK_FALSE(cairn_test::message_of([&] { static_cast<void>(read_carmen(folder / "none")); }).empty());
@@ -113,6 +119,16 @@ TEST_SUITE("io/carmen") {
     CHECK(log.scans[1].T_odom_robot.x() == doctest::Approx(0.5));
     CHECK(log.scans[1].T_odom_laser.x() == doctest::Approx(0.6));  // 0.1 m ahead of the robot
     CHECK(log.scans[2].T_odom_robot.x() == doctest::Approx(2));
+
+    // Times of the odometry that run back, as those of the Intel log do, are put in their order first.
+    std::string wheels_of_two;
+    for (const int t : {0, 1, 2, 3, 100, 4, 5, 6}) wheels_of_two += odometry(t == 100 ? 7 : t, t);
+    CarmenLog back = read(wheels_of_two + scan + "1.5 h 0\n" + scan + "3.5 h 0\n" + scan + "4.5 h 0\n");
+    place_by_odometry(back, "log");
+    CHECK(back.scans[0].T_odom_robot.x() == doctest::Approx(1.5));
+    CHECK(back.scans[1].T_odom_robot.x() == doctest::Approx(3.5));
+    CHECK(back.scans[2].T_odom_robot.x() == doctest::Approx(4.5));
+    CHECK(back.odometry[4].time == 100);  // which stay as they were
 
     // Raw scans know of no odometry; the scanner is where the parameter says.
     const std::string raw = "RAWLASER1 0 -1 2 0.5 30 0.01 0 3 1 2 40 1 9 ";

@@ -17,6 +17,7 @@
 #pragma once
 
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include <cairn/core/linalg.hpp>
@@ -106,9 +107,10 @@ public:
     return anchor_ * Line::from_pluecker(part_of<3, 1>(L, 0, 0), part_of<3, 1>(L, 3, 0));
   }
   /// Standard deviation across the line of its point on one of the rays (0 or 1), for a covariance of the
-  /// numbers [m].
+  /// numbers [m]; infinite at infinity.
   [[nodiscard]] double sigma_across(int end, const Matrix<4>& covariance) const {
     const double q = numbers_(2 + end);
+    if (q == 0) return std::numeric_limits<double>::infinity();
     const Vector<3> by_u = w_ / q, by_q = -ray(end) / (q * q);
     const Vector<3> direction = part_of<3, 1>(pluecker(), 3, 0).normalized();
     const Vector<3> u = by_u - direction.dot(by_u) * direction, v = by_q - direction.dot(by_q) * direction;

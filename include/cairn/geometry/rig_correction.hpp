@@ -86,18 +86,20 @@ public:
 
   [[nodiscard]] const StereoRig& nominal() const noexcept { return nominal_; }
 
-  /// (1)
+  /// (1). Throws Error where the numbers, or the pose that comes of them, are not finite.
   [[nodiscard]] StereoRig rig(const Vector<5>& state) const {
     StereoRig result = nominal_;
     result.T_left_right = SE3(rotation(state), nominal_.baseline() * direction(state));
+    expect_finite(result);
     return result;
   }
 
-  /// (1) and (2). Throws Error where a number is not finite.
+  /// (1) and (2). Throws Error where the numbers, or the rig that comes of them, are not finite.
   [[nodiscard]] StereoRig rig(const RigState& state) const {
     StereoRig result = rig(loose(state));
     result.T_left_right =
         SE3(result.T_left_right.rotation(), std::exp(state(5)) * result.T_left_right.translation());
+    expect_finite(result);
     const Vector<2> both(state(8), state(9));
     result.left = corrected(nominal_.left, state(6), both);
     result.right = corrected(nominal_.right, state(6) + state(7), both + Vector<2>(state(10), state(11)));
@@ -122,6 +124,10 @@ public:
   [[nodiscard]] Matrix<3, 2> direction_jacobian() const { return part_of<3, 2>(axes_, 0, 1); }
 
 private:
+  static void expect_finite(const StereoRig& rig) {
+    if (!all_finite(rig.T_left_right.matrix()) || !(rig.baseline() > 0))
+      raise("RigCorrection: expected numbers of which a rig with a baseline comes");
+  }
   [[nodiscard]] static PinholeCamera corrected(const PinholeCamera& camera, double focal,
                                                const Vector<2>& centre) {
     PinholeParameters p = camera.parameters();

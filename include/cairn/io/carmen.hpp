@@ -79,6 +79,13 @@ public:
     return *value;
   }
 
+  double above_zero(const char* what) {
+    const std::string_view field = trimmed(rest_);
+    const double value = number(what);
+    if (!(value > 0)) refuse(what, "a number above zero", field.substr(0, field.find_first_of(" \t")));
+    return value;
+  }
+
   /// A number of beams, or of what else there may be a few thousand of.
   std::size_t count(const char* what) {
     constexpr std::size_t most = 100000;
@@ -142,7 +149,7 @@ inline LaserScan described_scan(CarmenFields& fields, double farthest) {
   scan.first_angle = fields.number("the first angle");
   fields.number("the field of view");
   scan.angle_step = fields.number("the angle between beams");
-  scan.farthest = std::min(farthest, fields.number("the largest range"));
+  scan.farthest = std::min(farthest, fields.above_zero("the largest range"));
   fields.number("the accuracy");
   fields.number("the mode");
   fields.ranges(scan.range, fields.count("the number of ranges"));
@@ -249,7 +256,8 @@ inline void place_by_odometry(CarmenLog& log, const std::string& name) {
             ": expected scans with odometry, found scans that all carry the same pose and no ODOM line");
     return;
   }
-  const auto& odometry = log.odometry;
+  std::vector<StampedOdometry> odometry = log.odometry;  // whose times may run back
+  std::ranges::stable_sort(odometry, {}, &StampedOdometry::time);
   for (StampedScan& scan : log.scans) {
     const auto after = std::ranges::upper_bound(odometry, scan.time, {}, &StampedOdometry::time);
     SE2 pose = after == odometry.begin() ? odometry.front().T_odom_robot : std::prev(after)->T_odom_robot;
