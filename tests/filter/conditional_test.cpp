@@ -1,8 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <map>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -255,6 +257,40 @@ TEST_SUITE("filter/conditional") {
     CHECK(belief.path(9).front().pose(0) == 10);
     CHECK(belief[9].map.inserted.empty());
     CHECK(belief[5].pose(0) < 10);
+  }
+
+  TEST_CASE(
+      "conditional: a record whose paths are not as long as its steps, or whose weights are none, is "
+      "refused") {
+    MappedPaths<Memory> belief(Line(0.0), Memory{}, 3);
+    for (int step = 0; step < 4; ++step)
+      REQUIRE(ConditionalFilter{}.step(belief, motion, FromMotion{}, step + 1.0).accepted());
+    const PathsRecord<Line> good = belief.record();
+    const auto words = [](const PathsRecord<Line>& record) {
+      return cairn_test::message_of(
+          [&] { const MappedPaths<Memory> made(record, std::vector<Memory>(record.particles.size())); });
+    };
+    CHECK(words(good).empty());
+    for (const std::uint64_t step : {0U, 3U, 5U}) {  // an ancestor would be looked for before the first
+      PathsRecord<Line> bad = good;
+      bad.step = step;
+      CHECK(words(bad).find("one pose a step") != std::string::npos);
+    }
+    PathsRecord<Line> bad = good;
+    bad.particles[2].node = bad.nodes[bad.particles[2].node].parent;
+    CHECK(words(bad).find("one pose a step") != std::string::npos);
+    const double infinity = std::numeric_limits<double>::infinity();
+    for (const double weight : {std::nan(""), infinity}) {
+      bad = good;
+      bad.particles[1].log_weight = weight;
+      CHECK(words(bad).find("weights that are numbers") != std::string::npos);
+      bad = good;
+      bad.particles[0].log_evidence = weight;
+      CHECK(words(bad).find("weights that are numbers") != std::string::npos);
+    }
+    bad = good;
+    bad.particles[1].log_weight = -infinity;
+    CHECK(words(bad).empty());
   }
 
   TEST_CASE("conditional: ancestors are counted by what their descendants weigh, as the paths have them") {

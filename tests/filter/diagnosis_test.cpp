@@ -112,6 +112,20 @@ TEST_CASE("diagnosis: says what a process got wrong, and the time step") {
   CHECK(says(world.predicted(-0.5), "dt is -0.5"));
 }
 
+TEST_CASE(
+    "diagnosis: asks a process for the noise that the filters asked for, at the state before the step") {
+  struct Walk {
+    using State = Vector<1>;
+    using Control = cairn::NoControl;
+    [[nodiscard]] State propagate(const State& x, const Control&, double) const { return State(x(0) - 10); }
+    [[nodiscard]] Matrix<1> jacobian(const State&, const Control&, double) const { return Matrix<1>(1.0); }
+    [[nodiscard]] Matrix<1> noise(const State& x, const Control&, double) const { return Matrix<1>(x(0)); }
+  };
+  cairn::Gaussian<Vector<1>> belief{Vector<1>(-3.0), Matrix<1>(1.0)};
+  const Status status = cairn::Extended{}.predict(belief, Walk{}, 1);
+  CHECK(says(cairn::explain(status, belief, Walk{}, 1), "the variance in row 0 is negative: -3"));
+}
+
 TEST_CASE("diagnosis: adds nothing where there is nothing to add") {
   World world;
   CHECK(cairn::explain(Status::gated, world.belief, world.gps, world.z) == cairn::explain(Status::gated));

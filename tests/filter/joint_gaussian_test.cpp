@@ -17,6 +17,7 @@
 #include <cairn/filter/joint_extended.hpp>
 #include <cairn/filter/kalman.hpp>
 #include <cairn/manifold/se3.hpp>
+#include <cairn/manifold/so3.hpp>
 #include <cairn/models/linear.hpp>
 #include <cairn/models/motion.hpp>
 #include <cairn/models/sensor.hpp>
@@ -800,6 +801,104 @@ TEST_SUITE("joint_gaussian") {
     CHECK(belief.commit(both, Vector<d>::Zero(5), five, SE2()).status == Status::size_mismatch);
 
     CHECK(numbers(scene.belief) == before);
+  }
+
+  TEST_CASE("joint_gaussian: what is moved from is empty, and may be used again") {
+    Scene scene(9);
+    Slam belief = scene.belief;
+    REQUIRE(belief.consider(scene.landmarks[0]) == Status::accepted);
+    REQUIRE(belief.marginalise(scene.landmarks[1]) == Status::accepted);  // leaves a gap
+    const Slam before = belief;
+    Slam moved = std::move(belief);
+    CHECK(numbers(moved) == numbers(before));
+    for (const bool by_assignment : {false, true}) {
+      CAPTURE(by_assignment);
+      if (by_assignment) {
+        belief = std::move(moved);
+        std::swap(belief, moved);
+      }
+      CHECK(belief.empty());
+      CHECK(belief.dof() == 0);
+      CHECK(belief.covariance().size() == 0);
+      CHECK_FALSE(belief.contains(scene.robot));
+      const auto first = belief.add(Vector<2>(1, 2), Matrix<2>(Matrix<2>::Identity()));
+      REQUIRE(first.accepted());
+      CHECK(belief.dof() == 2);
+      const auto second = belief.clone(first.id);
+      REQUIRE(second.accepted());
+      const cairn::LinearSensor<2, 2> sensor{Matrix<2>::Identity(), Matrix<2>(Matrix<2>::Identity())};
+      REQUIRE(JointExtended{}.update(belief, sensor, Vector<2>(3, 2), second.id).accepted());
+      CHECK(belief.mean(first.id)(0) == doctest::Approx(2));
+      CHECK(belief.covariance(first.id)(1, 1) == doctest::Approx(0.5));
+      CHECK(belief.covariance().rows() == 4);
+      REQUIRE(belief.marginalise(belief.blocks()) == Status::accepted);
+    }
+  }
+
+  TEST_CASE("joint_gaussian: blocks do not become vaguer beside considered ones that were known by them") {
+    Slam belief;
+    const auto a = belief.add(Vector<2>(1, 2), Matrix<2>(Matrix<2>::Identity())).id;
+    const auto b = belief.clone(a).id;
+    REQUIRE(belief.consider(b) == Status::accepted);
+    const std::array<AnyBlockId, 1> named{a};
+    const Vector<d> none = Vector<d>::Zero(2);
+    const auto posterior = [](double first, double second) {
+      Matrix<d, d> p = Matrix<d, d>::Zero(2, 2);
+      p(0, 0) = first;
+      p(1, 1) = second;
+      return p;
+    };
+    const auto before = numbers(belief);
+    // By the formula the two would vary with each other by 4, where one varies by 4 and the other by 1.
+    CHECK(belief.commit(named, none, posterior(4, 4)) == Status::not_positive_definite);
+    CHECK(belief.commit(named, none, posterior(0.5, 1.5)) == Status::not_positive_definite);
+    CHECK(numbers(belief) == before);
+    CHECK(belief.commit(named, none, posterior(1, 1)) == Status::accepted);
+    CHECK(belief.commit(named, none, posterior(0.5, 1)) == Status::accepted);
+    CHECK(belief.covariance(b) == Matrix<2>::Identity());
+    REQUIRE(belief.consider(b, false) == Status::accepted);
+    REQUIRE(belief.commit(named, none, posterior(2, 4)) == Status::accepted);
+    CHECK(belief.covariance(b)(1, 1) == doctest::Approx(4));
+  }
+
+  TEST_CASE("joint_gaussian: a variance that rounding leaves below zero is no number that is not finite") {
+    cairn::Random random(cairn_test::seed());
+    int refused = 0;
+    for (int trial = 0; trial < 300; ++trial) {
+      const Vector<2> along(random.normal(), random.normal());
+      Slam belief;
+      const auto id =
+          belief.add(Vector<2>(0, 0), cairn::symmetrised(Matrix<2>(along * along.transpose()))).id;
+      cairn::LinearModel<2> process{Matrix<2>::Identity(), Matrix<2>::Zero()};
+      process.transition << along(1), -along(0), 0, 1;  // of nothing but rounding in its first row
+      const Status status = JointExtended{}.predict(belief, process, 1, id);
+      CHECK(status != Status::not_finite);
+      refused += status == Status::not_positive_definite ? 1 : 0;
+    }
+    CHECK(refused > 10);
+  }
+
+  TEST_CASE("joint_gaussian: steps too long for a rotation are refused") {
+    struct Attitude {
+      using State = cairn::SO3;
+      using Measurement = Vector<3>;
+      [[nodiscard]] Vector<3> predict(const State&) const { return Vector<3>::Zero(); }
+      [[nodiscard]] Matrix<3> jacobian(const State&) const { return Matrix<3>::Identity(); }
+      [[nodiscard]] Matrix<3> noise(const State&) const { return 1e307 * Matrix<3>::Identity(); }
+    };
+    JointGaussian<cairn::SO3> belief;
+    const auto id = belief.add(cairn::SO3(), Matrix<3>(1e307 * Matrix<3>::Identity())).id;
+    const auto twin = belief.clone(id).id;
+    const Vector<3> far(1e155, 0, 0);
+    CHECK(JointExtended{}.update(belief, Attitude{}, far, id).status == Status::not_finite);
+    StackedMeasurement stack;
+    REQUIRE(stack.add(belief, Attitude{}, far, id) == Status::accepted);
+    CHECK(JointExtended{}.update(belief, stack).status == Status::not_finite);
+    const std::array<AnyBlockId, 1> named{id};
+    CHECK(belief.commit(named, far, Matrix<d, d>::Identity(3, 3)) != Status::accepted);
+    CHECK(belief.mean(id).w() == 1);
+    CHECK(belief.mean(twin).w() == 1);
+    CHECK(JointExtended{}.update(belief, Attitude{}, Vector<3>(1, 0, 0), id).accepted());
   }
 
   TEST_CASE("joint_gaussian: reading a block that is not there goes to the violation handler") {

@@ -235,10 +235,14 @@ struct Program {
     for (const int i : named) blocks.push_back(ids[static_cast<std::size_t>(i)]);
     const Matrix<cairn::dynamic> prior = belief.covariance(blocks);
     const int d = static_cast<int>(prior.rows());
-    // a share of the prior, and a little
-    const double share = random.uniform(0.3, 1.2);
+    bool beside_considered = false;
+    for (int i = 0; i < count(); ++i)
+      beside_considered = beside_considered || (belief.considered(ids[static_cast<std::size_t>(i)]) &&
+                                                std::ranges::find(named, i) == named.end());
+    // a share of the prior, and a little; not more than it where others are considered
+    const double share = random.uniform(0.3, beside_considered ? 1.0 : 1.2);
     Matrix<cairn::dynamic> posterior = share * prior;
-    for (int k = 0; k < d; ++k) posterior(k, k) += 0.01 * prior(k, k);
+    for (int k = 0; k < d && !beside_considered; ++k) posterior(k, k) += 0.01 * prior(k, k);
     Vector<cairn::dynamic> step(d);
     for (int k = 0; k < d; ++k) step(k) = 0.2 * std::sqrt(prior(k, k)) * random.normal();
     if (random.below(2) == 0) {

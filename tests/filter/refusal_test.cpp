@@ -276,6 +276,16 @@ TEST_SUITE("refusals") {
     CHECK((belief.covariance - left).norm() < 1e-15);
   }
 
+  TEST_CASE("constrain: a mean that is not finite, or would not be, is refused") {
+    Gaussian<Vector<2>> belief{Vector<2>(std::nan(""), 1), Matrix<2>::Identity()};
+    CHECK(cairn::constrain(belief, Matrix<1, 2>(1, 0), Vector<1>(0.5)) == Status::not_finite);
+    CHECK(belief.covariance == Matrix<2>::Identity());
+    Gaussian<cairn::SO3> attitude{cairn::SO3(), 1e308 * Matrix<3>::Identity()};
+    CHECK(cairn::constrain(attitude, Matrix<1, 3>(1, 0, 0), Vector<1>(1e180)) == Status::not_finite);
+    CHECK(attitude.mean.w() == 1);
+    CHECK(cairn::constrain(attitude, Matrix<1, 3>(1, 0, 0), Vector<1>(1.0)) == Status::accepted);
+  }
+
   TEST_CASE("constrain: what contradicts itself, or what is certain, is refused; repetitions are not") {
     const Gaussian<Vector<2>> prior{Vector<2>(1, 2), Vector<2>(4, 1).asDiagonal()};
     Gaussian<Vector<2>> belief = prior;

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 #include <cmath>
+#include <stdexcept>
 
 #include <Eigen/Cholesky>
 #include <doctest/doctest.h>
@@ -167,6 +168,41 @@ TEST_SUITE("robust") {
     CHECK(cairn::detail::is_valid_covariance<2, double>(Matrix<2>(kept - 0.4999 * truth)));
     wild.residual(0) = std::nan("");
     CHECK(cairn::innovated_noise<2, double>(truth, wild, 0.5) == truth);
+  }
+
+  TEST_CASE("robust, huber and student: what a sensor throws comes through and leaves the belief") {
+    struct Failing : cairn::LinearSensor<1, 1> {
+      int* left;  // calls before it fails
+      void tick() const {
+        if ((*left)-- == 0) throw std::runtime_error("no more");
+      }
+      [[nodiscard]] Vector<1> predict(const Vector<1>& x) const {
+        tick();
+        return cairn::LinearSensor<1, 1>::predict(x);
+      }
+      [[nodiscard]] Matrix<1> noise(const Vector<1>& x) const {
+        tick();
+        return cairn::LinearSensor<1, 1>::noise(x);
+      }
+    };
+    const auto try_all = [](const auto& filter) {
+      for (int calls = 0;; ++calls) {
+        int left = calls;
+        auto belief = prior;
+        try {
+          const auto in = filter.update(belief, Failing{sensor, &left}, Vector<1>(30));
+          REQUIRE(in.accepted());
+          CHECK(belief.mean(0) != prior.mean(0));
+          return calls;
+        } catch (const std::runtime_error&) {
+          REQUIRE(belief.mean == prior.mean);
+          REQUIRE(belief.covariance == prior.covariance);
+        }
+      }
+    };
+    CHECK(try_all(cairn::Robust<Kalman>{}) > 4);
+    CHECK(try_all(Huber<Kalman>{}) > 4);
+    CHECK(try_all(StudentT<Kalman>{}) > 4);
   }
 
   TEST_CASE("huber and student: refuse bad options and numbers and keep the belief") {

@@ -62,7 +62,7 @@ public:
     return size_ - 1;
   }
   void set(std::size_t index, const Belief& belief) {
-    CAIRN_ASSERT(index < size_ + 1, "GaussianBatch: index past the end");
+    CAIRN_ASSERT(index < size_, "GaussianBatch: index past the end");
     Block& block = blocks_[index / lanes];
     const std::size_t lane = index % lanes;
     for (int i = 0; i < N; ++i) {

@@ -264,13 +264,15 @@ public:
   }
 
   /// The belief that record() described, with its particles' maps in their order. Throws Error where the two
-  /// do not fit each other.
+  /// do not fit each other, a path has not one pose a step, or a weight is none.
   MappedPaths(const PathsRecord<Pose>& record, std::vector<M> maps) : step_(record.step) {
     if (record.particles.empty() || record.particles.size() != maps.size())
       raise("MappedPaths: expected as many maps as particles, and at least one");
+    std::vector<std::uint64_t> steps;  // before each node
     for (std::size_t i = 0; i < record.nodes.size(); ++i) {
       const auto& [pose, parent] = record.nodes[i];
       if (parent != Tree::none && parent >= i) raise("MappedPaths: expected parents before their children");
+      steps.push_back(parent == Tree::none ? 0 : steps[parent] + 1);
       paths_.extend(parent, pose);
     }
     std::vector<Particle> all;
@@ -278,6 +280,10 @@ public:
     for (std::size_t i = 0; i < maps.size(); ++i) {
       const auto& [node, log_evidence, log_weight, regime] = record.particles[i];
       if (node >= record.nodes.size()) raise("MappedPaths: expected particles at nodes that there are");
+      if (steps[node] != step_) raise("MappedPaths: expected paths of one pose a step");
+      const double most = std::numeric_limits<double>::max();
+      if (!(log_evidence <= most && log_weight <= most))
+        raise("MappedPaths: expected weights that are numbers");
       paths_.hold(node);
       all.push_back({paths_.at(node).pose, std::move(maps[i]), node, log_evidence, regime});
       log_weights.push_back(log_weight);

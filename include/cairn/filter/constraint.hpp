@@ -162,7 +162,9 @@ Status constrain(Gaussian<X>& belief, const Matrix<K, dof<X>, ScalarOf<X>>& d,
   if (!detail::has_size(d, c.size(), detail::common_size(belief.mean, belief.covariance)) || c.size() == 0)
     return Status::size_mismatch;
   const int ns = static_cast<int>(belief.covariance.rows());
-  if (!all_finite(d) || !all_finite(c) || !all_finite(belief.covariance)) return Status::not_finite;
+  if (!all_finite(d) || !all_finite(c) || !all_finite(belief.covariance) ||
+      !detail::finite_state(belief.mean))
+    return Status::not_finite;
   CovarianceOf<X> root = belief.covariance;
   if (!detail::checked_root<n, S>(belief.covariance, root)) return Status::not_positive_definite;
   Vector<n, S> sigma = Vector<n, S>::Zero(ns);
@@ -190,7 +192,9 @@ Status constrain(Gaussian<X>& belief, const Matrix<K, dof<X>, ScalarOf<X>>& d,
     for (int k = 0; k < ns; ++k) free(i, k) = S(0);  // rounding: known exactly now
   }
   if (!all_finite(step)) return Status::not_positive_definite;
-  belief.mean = retract(belief.mean, step);
+  const X mean = retract(belief.mean, step);
+  if (!detail::finite_state(mean)) return Status::not_finite;
+  belief.mean = mean;
   belief.covariance = detail::squared_root<n, S>(free);
   return Status::accepted;
 }

@@ -149,7 +149,7 @@ template <Manifold X, class F>
   const detail::AnyMatrix p = detail::any_matrix(belief.covariance);
   const X moved = detail::state_found<X>(process.propagate(belief.mean, control, dt));
   if (!detail::finite_state(moved)) return detail::explained(status, "propagate(x, u, dt) of the process");
-  const detail::AnyMatrix q = detail::any_matrix(process.noise(moved, control, dt));
+  const detail::AnyMatrix q = detail::any_matrix(process.noise(belief.mean, control, dt));
   if (status == Status::not_finite) {
     detail::AnyMatrix f(0, 0);
     if constexpr (LinearisedProcess<F>) f = detail::any_matrix(process.jacobian(belief.mean, control, dt));

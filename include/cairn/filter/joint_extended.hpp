@@ -441,7 +441,7 @@ Status JointExtended::predict(JointGaussian<Kinds...>& belief, const F& process,
   if (const Status status = detail::check_noise<n, S>(q); status != Status::accepted) return status;
   if (fading != 1.0) f *= static_cast<S>(std::sqrt(fading));
   const std::array<detail::RowRange, sizeof...(X)> ranges{belief.range(*belief.find(ids))...};
-  if (!belief.core_.transform(ranges, f.data(), q.data())) return Status::not_finite;
+  if (!belief.core_.transform(ranges, f.data(), q.data())) return belief.not_extended();
   belief.core_.write_transformed();
   if constexpr (sizeof...(X) == 1)
     (belief.set_mean(ids, moved), ...);
@@ -519,6 +519,10 @@ Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> JointExten
       return in;
     }
     core.step_by_whitened(y.data());
+    if (!core.may_step()) {
+      in.status = Status::not_finite;
+      return in;
+    }
     core.lower();
     belief.move(core.step());
     return in;
@@ -568,6 +572,7 @@ Status JointExtended::iterated(JointGaussian<Kinds...>& belief, const H& sensor,
   const Cholesky<dynamic, S> root(covariance);
   if (!root.good() || !lowers<dynamic, S>(core, last, root, mode.noise)) return Status::not_positive_definite;
   core.step_by_dual(last, dual.data());
+  if (!core.may_step()) return Status::not_finite;
   core.lower();
   belief.move_and_carry(core.step());
   return Status::accepted;
@@ -611,6 +616,10 @@ Innovation<dynamic, typename JointGaussian<Kinds...>::Scalar> JointExtended::upd
     return in;
   }
   belief.core_.step_by_whitened(y.data());
+  if (!belief.core_.may_step()) {
+    in.status = Status::not_finite;
+    return in;
+  }
   belief.core_.lower();
   belief.move(belief.core_.step());
   return in;

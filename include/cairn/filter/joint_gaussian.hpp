@@ -149,8 +149,8 @@ inline constexpr std::array<int, sizeof...(X)> block_offsets = [] {
 
 }  // namespace detail
 
-/// The belief over blocks of the given kinds. A plain value: copies are independent, ids serve both. Constant
-/// functions may be called from several threads at once.
+/// The belief over blocks of the given kinds. A plain value: copies are independent, ids serve both; what is
+/// moved from is empty. Constant functions may be called from several threads at once.
 template <Manifold... Kinds>
 class JointGaussian {
   using First = std::tuple_element_t<0, std::tuple<Kinds...>>;
@@ -271,7 +271,7 @@ public:
     Matrix<d, d, Scalar> p;
     if (!detail::to_plain<d, d, Scalar>(covariance, d, d, p)) return {{}, Status::size_mismatch};
     if (const Status status = check(mean, p); status != Status::accepted) return {{}, status};
-    if (!core_.extend({}, d, p.data())) return {{}, Status::not_finite};
+    if (!core_.extend({}, d, p.data())) return {{}, not_extended()};
     make_room<X>();
     return {enlist(mean, core_.write_extension(d)), Status::accepted};
   }
@@ -298,7 +298,7 @@ public:
         !detail::to_plain<d, d, Scalar>(model.noise(x, z), d, d, q))
       return {{}, Status::size_mismatch};
     if (const Status status = check(value, q); status != Status::accepted) return {{}, status};
-    if (!core_.extend(parts<d, X...>(g, ids...), d, q.data())) return {{}, Status::not_finite};
+    if (!core_.extend(parts<d, X...>(g, ids...), d, q.data())) return {{}, not_extended()};
     make_room<New>();
     return {enlist(value, core_.write_extension(d)), Status::accepted};
   }
@@ -311,7 +311,7 @@ public:
     constexpr int d = cairn::dof<X>;
     if (!has(id)) return {{}, Status::unknown_block};
     const Matrix<d, d, Scalar> one = Matrix<d, d, Scalar>::Identity(), none = Matrix<d, d, Scalar>::Zero();
-    if (!core_.extend(parts<d, X>(one, id), d, none.data())) return {{}, Status::not_finite};
+    if (!core_.extend(parts<d, X>(one, id), d, none.data())) return {{}, not_extended()};
     make_room<X>();
     const X value = mean(id);
     return {enlist(value, core_.write_extension(d)), Status::accepted};
@@ -419,8 +419,10 @@ public:
   /// `posterior` (both of the blocks one after the other, in the tangent spaces at the means), and the others
   /// follow by their correlations (but the considered ones):
   ///   K = P_:s P_ss^-1,   step_: = K step,   P <- P - K (P_ss - posterior) K^T
-  /// (the posterior may also be larger than P_ss). Refused: sizes, numbers that are not finite, a posterior
-  /// that is no covariance, a step where P_ss has no variance (not_positive_definite). O(n^2 d + d^3).
+  /// (the posterior may also be larger than P_ss, where no other block is considered). Refused: sizes,
+  /// numbers that are not finite, a posterior that is no covariance, a step where P_ss has no variance, and,
+  /// while others are considered, a posterior that is larger in any direction (not_positive_definite).
+  /// O(n^2 d + d^3).
   Status commit(std::span<const AnyBlockId> ids, const Vector<dynamic, Scalar>& step,
                 const Matrix<dynamic, dynamic, Scalar>& posterior) {
     const Status status = learn(ids, step, posterior, 0);
@@ -504,6 +506,11 @@ private:
     if (!detail::finite_state(mean) || !all_finite(p)) return Status::not_finite;
     return detail::is_valid_covariance<cairn::dof<X>, Scalar>(p) ? Status::accepted
                                                                  : Status::not_positive_definite;
+  }
+
+  /// Why the covariance refuses new rows, or the move of others.
+  [[nodiscard]] Status not_extended() const noexcept {
+    return core_.is_finite() ? Status::not_positive_definite : Status::not_finite;
   }
 
   /// The columns of a Jacobian of Rows rows that belong to each of the blocks.
@@ -639,7 +646,7 @@ private:
   std::vector<Slot> slots_;
   std::vector<std::uint32_t> free_slots_;
   std::vector<AnyBlockId> order_;
-  int dof_ = 0;
+  detail::MovedCount dof_;
 };
 
 }}  // namespace cairn::CAIRN_ABI

@@ -88,16 +88,16 @@ struct Robust {
     using B = cairn::BeliefOf<Filter, typename H::State>;
     constexpr int m = dof<typename H::Measurement>;
     static_assert(detail::demand_proper_belief<B>());
-    const B before = belief;
-    auto innovation = filter.update(belief, sensor, z);
-    if (!(limit > 0.0)) {
-      belief = before;
-      innovation.status = Status::bad_option;
-    }
+    B next = belief;  // what the sensor throws comes through and leaves the belief
+    auto innovation = filter.update(next, sensor, z);
+    if (!(limit > 0.0)) innovation.status = Status::bad_option;
     const bool judged = innovation.accepted() || innovation.status == Status::gated;
-    if (!judged || !(innovation.nis > static_cast<S>(limit))) return innovation;
-    const detail::PlainSensor plain(sensor, detail::size_of_belief(before), z);
-    const Matrix<m, m, S> r = detail::dense_of(plain.noise(before.mean));
+    if (!judged || !(innovation.nis > static_cast<S>(limit))) {
+      if (innovation.accepted()) belief = next;
+      return innovation;
+    }
+    const detail::PlainSensor plain(sensor, detail::size_of_belief(belief), z);
+    const Matrix<m, m, S> r = detail::dense_of(plain.noise(belief.mean));
     const auto nis = [&](double factor) {
       const Matrix<m, m, S> s = innovation.covariance + static_cast<S>(factor - 1.0) * r;
       return static_cast<double>(detail::squared_mahalanobis<m, S>(innovation.residual, s));
@@ -106,7 +106,6 @@ struct Robust {
     double high = 2.0;
     while (nis(high) > limit && high < 1e30) high *= 2.0;
     if (!detail::is_regular_noise<m, S>(r) || !(nis(high) <= limit)) {
-      belief = before;
       innovation.status = Status::not_positive_definite;
       return innovation;
     }
@@ -114,7 +113,6 @@ struct Robust {
       const double middle = 0.5 * (low + high);
       (nis(middle) > limit ? low : high) = middle;
     }
-    belief = before;
     return filter.update(belief, detail::Inflated<H>{sensor, high}, z);
   }
 };
@@ -138,37 +136,33 @@ auto reweighted_update(const Filter& filter, BeliefOf<Filter, typename H::State>
   constexpr int m = dof<typename H::Measurement>;
   static_assert(demand_proper_belief<B>());
   const PlainSensor plain(sensor, size_of_belief(belief), z);
-  const B before = belief;
   const auto residual_size = [&](const B& updated) {
     const Vector<m, S> r = plain.residual(updated.mean);
     const Matrix<m, m, S> noise = dense_of(plain.noise(updated.mean));
     using std::sqrt;
     return sqrt(static_cast<double>(squared_mahalanobis<m, S>(r, noise)));
   };
-  auto innovation = filter.update(belief, sensor, z);
+  B next = belief;  // what the sensor throws comes through and leaves the belief
+  auto innovation = filter.update(next, sensor, z);
   if (!innovation.accepted()) return innovation;
-  if (const Matrix<m, m, S> r = dense_of(plain.noise(before.mean)); !is_regular_noise<m, S>(r)) {
-    belief = before;
+  if (const Matrix<m, m, S> r = dense_of(plain.noise(belief.mean)); !is_regular_noise<m, S>(r)) {
     innovation.status = Status::not_positive_definite;
     return innovation;
   }
   constexpr double close = std::is_same_v<S, float> ? 1e-5 : 1e-9;
-  double factor = 1.0 / weight(residual_size(belief));
+  double factor = 1.0 / weight(residual_size(next));
   for (int step = 0; step < 1000; ++step) {
-    B next = before;
-    const auto found = filter.update(next, Inflated<H>{sensor, factor}, z);
-    if (!found.accepted()) {
-      belief = before;
-      return found;
-    }
-    belief = next;
-    innovation = found;
+    next = belief;
+    innovation = filter.update(next, Inflated<H>{sensor, factor}, z);
+    if (!innovation.accepted()) return innovation;
     const double wanted = 1.0 / weight(residual_size(next));
     const double change = wanted - factor;
     factor = wanted;
-    if ((change < 0 ? -change : change) <= close * wanted) return innovation;
+    if ((change < 0 ? -change : change) <= close * wanted) {
+      belief = next;
+      return innovation;
+    }
   }
-  belief = before;
   innovation.status = Status::not_converged;
   return innovation;
 }

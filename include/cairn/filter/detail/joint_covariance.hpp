@@ -266,6 +266,12 @@ public:
     if (considered_count_ > 0) mask(step_, 1);
   }
   [[nodiscard]] const S* step() const noexcept { return step_; }
+  /// Every number of the step is finite, and its square: groups turn by the length of theirs.
+  [[nodiscard]] bool may_step() const {
+    S none(0);
+    for (std::size_t i = 0; i < stride_; ++i) none += (step_[i] * step_[i]) * S(8) * S(0);
+    return none == S(0);
+  }
 
   /// P - W W^T has digits left in every variance, and is a covariance where it was looked at.
   [[nodiscard]] bool sound() {
@@ -347,8 +353,11 @@ public:
           corner[j * d + i] += row(stabilised_, i)[named_rows_[index(k)]] * f[k * d + j];
     mirror(corner, d);
     put_corner(stabilised_, corner);
-    return finite_rows(stabilised_, d) && variances(corner, d);
+    is_finite_ = finite_rows(stabilised_, d);
+    return is_finite_ && variances(corner, d);
   }
+  /// Whether what transform() or extend() has refused was a negative variance, and all numbers finite.
+  [[nodiscard]] bool is_finite() const noexcept { return is_finite_; }
   void write_transformed() { scatter(stabilised_); }
 
   /// Rows for `count` new numbers, J times named rows, with covariance J P J^T + Q; Q is column-major. The
@@ -372,7 +381,8 @@ public:
                 row(added_, i)[part.block.first + k] * part.jacobian[k * part.leading + j];
     mirror(corner_, count);
     make_room(size() + count);
-    return finite_rows(added_, count) && variances(corner_, count);
+    is_finite_ = finite_rows(added_, count);
+    return is_finite_ && variances(corner_, count);
   }
   [[nodiscard]] int write_extension(int count) {
     const int first = place(count);
@@ -388,7 +398,9 @@ public:
   /// `posterior` (d x d; null for zero), and `added` new numbers with them (posterior is then of d + added).
   ///   K = P_:s P_ss^-1,   step_: = K step,   P <- P - K (P_ss - posterior) K^T
   /// through the Cholesky factor of P_ss along its largest pivots, so that it may be singular. False where
-  /// the step leaves the directions in which the prior has variance. O(n d^2 + d^3).
+  /// the step leaves the directions in which the prior has variance, and for a posterior that is larger than
+  /// P_ss in any direction while others are considered: those keep their covariance, and their share in what
+  /// grows would be more than it holds. O(n d^2 + d^3).
   [[nodiscard]] bool learn(std::span<const RowRange> blocks, const S* step, const S* posterior, int added,
                            S& squared) {
     name(blocks);
@@ -396,6 +408,7 @@ public:
     stride_ = padded<S>(size() + added);
     work_.open((4 * index(d) + index(added) + 1) * stride_ + scratch_for(d + added));
     gathered_ = gather(index(d));
+    if (posterior != nullptr && others_are_considered() && !lowers_named(posterior, d + added)) return false;
     NamedRoot root;
     if (!factor_named(root)) return false;
     m_ = root.rank;
@@ -421,7 +434,7 @@ public:
     }
     put_learned(step, posterior, added);
     make_room(size() + added);
-    const bool finite = finite_rows(stabilised_, d) && finite_rows(step_, 1) && finite_rows(added_, added);
+    const bool finite = finite_rows(stabilised_, d) && may_step() && finite_rows(added_, added);
     // Considered rows other than the named ones stay.
     for (int i = 0; i < size() && considered_count_ > 0; ++i)
       if (considered_[index(i)] != 0 && !is_named(i)) step_[i] = S(0);
@@ -492,6 +505,22 @@ private:
   }
 
   // Of learn().
+
+  [[nodiscard]] bool others_are_considered() const {
+    int named = 0;
+    for (const int i : named_rows_) named += considered_[index(i)];
+    return considered_count_ > named;
+  }
+  /// P_ss - posterior (of `leading` rows, those of P_ss first) is a covariance but for the rounding of P_ss.
+  [[nodiscard]] bool lowers_named(const S* posterior, int leading) {
+    const int d = named_count();
+    S* const less = work_.take(index(d) * index(d));
+    for (int q = 0; q < d; ++q) {
+      for (int p = 0; p < d; ++p) less[q * d + p] = named(gathered_, p, q) - posterior[q * leading + p];
+      less[q * d + q] += no_variance<S> * named(gathered_, q, q);
+    }
+    return semi_definite(less, d);
+  }
 
   /// P_ss = L L^T along its largest pivots, as pivoted_cholesky() leaves it: (p, k) is L of named row p and
   /// pivot k, for rows that are pivots from k on.
@@ -727,7 +756,7 @@ private:
 
   SymmetricRows<S> p_;
   std::vector<unsigned char> free_, considered_;  // by row
-  int free_count_ = 0, considered_count_ = 0;
+  MovedCount free_count_, considered_count_;
 
   // Of the step that is being made.
   Workspace<S> work_;
@@ -735,6 +764,7 @@ private:
   std::vector<int> named_rows_, where_, order_, certain_, kept_, moved_;
   std::size_t stride_ = 0;
   int m_ = 0;
+  bool is_finite_ = true;
   S *gathered_ = nullptr, *cross_ = nullptr, *less_ = nullptr, *step_ = nullptr, *stabilised_ = nullptr,
     *added_ = nullptr, *corner_ = nullptr;
 };

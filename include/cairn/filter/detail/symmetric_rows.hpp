@@ -14,6 +14,7 @@
 #include <cstring>
 #include <span>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <cairn/filter/detail/register_column.hpp>
@@ -57,6 +58,31 @@ template <class T>
 void room_for(std::vector<T>& list, std::size_t count) {
   if (list.capacity() < count) list.reserve(std::max(count, 2 * list.capacity()));
 }
+
+/// A number that counts what a container beside it holds: nothing where that was moved away.
+class MovedCount {
+public:
+  MovedCount() = default;
+  MovedCount(const MovedCount&) = default;
+  MovedCount(MovedCount&& other) noexcept : number_(std::exchange(other.number_, 0)) {}
+  MovedCount& operator=(const MovedCount&) = default;
+  MovedCount& operator=(MovedCount&& other) noexcept {
+    number_ = std::exchange(other.number_, 0);
+    return *this;
+  }
+  ~MovedCount() = default;
+  MovedCount& operator=(int number) noexcept {
+    number_ = number;
+    return *this;
+  }
+  MovedCount& operator+=(int number) noexcept { return *this = number_ + number; }
+  MovedCount& operator-=(int number) noexcept { return *this = number_ - number; }
+  // NOLINTNEXTLINE(google-explicit-constructor): stands for the number
+  operator int() const noexcept { return number_; }
+
+private:
+  int number_ = 0;
+};
 
 template <class S>
 class SymmetricRows {
@@ -240,7 +266,7 @@ private:
   }
 
   std::vector<CacheLine<S>> lines_;
-  int size_ = 0;
+  MovedCount size_;
 };
 
 }}}  // namespace cairn::CAIRN_ABI::detail
