@@ -536,6 +536,40 @@ TEST_SUITE("keyframe_map") {
     CHECK(map.take_dropped().empty());
   }
 
+  TEST_CASE("keyframe_map: a landmark that is matched twice in a frame counts once") {
+    const Scene s = scene(5, 6, 40);
+    const auto twice = [](std::vector<StereoSighting> seen) {
+      const std::vector<StereoSighting> again = seen;
+      seen.insert(seen.end(), again.begin(), again.end());
+      return seen;
+    };
+    KeyframeMapOptions options = plain();
+    options.max_keyframes = 4;  // entries of lists are struck
+    KeyframeMap once(cairn_test::arena_rig(), options), doubled = once;
+    for (KeyframeMap* map : {&once, &doubled}) {
+      map->begin(s.poses[0]);
+      for (const StereoSighting& one : s.seen[0]) REQUIRE(map->add_landmark(one));
+    }
+    for (std::size_t k = 1; k < s.poses.size(); ++k) {
+      CAPTURE(k);
+      const auto both = twice(s.seen[k]);
+      const auto here = once.locate(s.poses[k], s.seen[k]), there = doubled.locate(s.poses[k], both);
+      REQUIRE(here.good());
+      REQUIRE(there.good());
+      CHECK(there.inlier_count == here.inlier_count);
+      CHECK(there.covariance == here.covariance);
+      for (std::size_t i = s.seen[k].size(); i < both.size(); ++i) CHECK(there.inliers[i] == 0);
+      REQUIRE(once.add_keyframe(here, s.seen[k]));
+      REQUIRE(doubled.add_keyframe(there, both));
+      REQUIRE(doubled.covariance() == once.covariance());
+      for (const std::uint32_t id : doubled.landmark_ids()) {
+        const auto list = doubled.sightings_of(id);
+        for (std::size_t i = 1; i < list.size(); ++i) CHECK(list[i].keyframe > list[i - 1].keyframe);
+        CHECK(doubled.landmark(id).has_value() == once.landmark(id).has_value());
+      }
+    }
+  }
+
   TEST_CASE("keyframe_map: keyframes that no landmark rests on leave") {
     const Scene s = scene(cairn_test::seed(), 3, 40);
     KeyframeMap map = mapped(s, {});

@@ -298,8 +298,9 @@ public:
   /// Where the camera is, from matches of which some may be wrong, near `start`, which most of the good ones
   /// agree with to within their noise. Uses the keyframes' joint covariance as a prior, so that where old and
   /// drifted landmarks are in view together the old ones decide; changes nothing in the map but when
-  /// landmarks were last seen. O(matches m^2 + (6 s)^3) for m sightings a landmark and s keyframes in play.
-  /// Throws Error for numbers that are not finite.
+  /// landmarks were last seen. Of several matches of one landmark the first counts, and the others do not
+  /// agree. O(matches m^2 + (6 s)^3) for m sightings a landmark and s keyframes in play. Throws Error for
+  /// numbers that are not finite.
   [[nodiscard]] MapLocation locate(const SE3& start, std::span<const StereoSighting> matches) {
     if (!all_finite(start.matrix())) raise("KeyframeMap::locate: expected a finite pose to start from");
     ++frame_;
@@ -333,8 +334,9 @@ public:
   /// or, where they do not determine it, from all, and the map loses the landmarks whose lists were full.
   /// `matches` are those that located it. False where nothing determines it: the map is then as before.
   bool add_keyframe(const MapLocation& here, std::span<const StereoSighting> matches) {
-    CAIRN_EXPECTS(here.good() && here.inliers.size() == matches.size(),
-                  "KeyframeMap::add_keyframe: the matches are those of a location that is good");
+    CAIRN_EXPECTS(
+        here.good() && here.inliers.size() == matches.size() && here.chi_squared.size() == matches.size(),
+        "KeyframeMap::add_keyframe: the matches are those of a location that is good");
     std::vector<std::uint8_t> grows(matches.size(), 0), all = here.inliers;
     for (std::size_t i = 0; i < matches.size(); ++i)
       if (here.inliers[i] != 0)
@@ -458,13 +460,15 @@ private:
     }
     constexpr auto nowhere = static_cast<std::uint32_t>(-1);
     std::vector<std::uint32_t> place(keyframes_.size(), nowhere);
+    std::vector<std::uint8_t> taken(landmarks_.size(), 0);
     for (std::size_t i = 0; i < matches.size(); ++i) {
       if (!chosen.empty() && chosen[i] == 0) continue;
       const auto found = place_.find(matches[i].landmark);
-      if (found == place_.end()) continue;
+      if (found == place_.end() || taken[found->second] != 0) continue;
       const auto seen =
           detail::WhitenedSighting::of(rig_, matches[i].left, matches[i].right, matches[i].sigma);
       if (!seen) continue;
+      taken[found->second] = 1;
       Entry entry;
       entry.match = i;
       entry.landmark = found->second;
@@ -660,6 +664,10 @@ private:
       const StereoSighting& s = work.matches[entry.match];
       const double sigma = s.sigma / std::sqrt(entry.weight);
       const auto whitened = detail::WhitenedSighting::of(rig_, s.left, s.right, sigma);
+      if (!whitened) {  // pixels of no ray of the rig that was learned: P knows of them, the list cannot
+        spent.push_back(one.id);
+        continue;
+      }
       one.sightings[one.count++] = {newest, sigma, s.left, s.right, *whitened};
       ++one.of_visit;
       ++keyframes_[newest].sightings;
