@@ -878,6 +878,70 @@ TEST_SUITE("joint_gaussian") {
     CHECK(refused > 10);
   }
 
+  TEST_CASE("joint_gaussian: sensors far better than the prior leave digits, or are refused") {
+    // A follows from B, which is seen: by the inverse of sums of inverses, in long double.
+    using Long = long double;
+    struct Copy {
+      using State = Vector<2>;
+      using Measurement = Vector<1>;
+      using New = Vector<2>;
+      double variance;
+      [[nodiscard]] New initialise(const State& x, const Measurement&) const { return x; }
+      [[nodiscard]] Matrix<2> jacobian(const State&, const Measurement&) const {
+        return Matrix<2>::Identity();
+      }
+      [[nodiscard]] Matrix<2> noise(const State&, const Measurement&) const {
+        return variance * Matrix<2>::Identity();
+      }
+    };
+    const auto inverse = [](const std::array<Long, 3>& a) {  // of a symmetric matrix: xx, xy, yy
+      const Long det = a[0] * a[2] - a[1] * a[1];
+      return std::array<Long, 3>{a[2] / det, -a[1] / det, a[0] / det};
+    };
+    const std::uint64_t seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    int accepted = 0, refused = 0;
+    for (int trial = 0; trial < 3000; ++trial) {
+      const double r = std::pow(10.0, -1.0 - static_cast<double>(random.below(16)));
+      Matrix<2> a, h;
+      for (int i = 0; i < 4; ++i) {
+        a.data()[i] = random.normal();
+        h.data()[i] = random.normal();
+      }
+      // Far from singular, so that diagonals tell what is lost.
+      const auto det = [](const Matrix<2>& m) { return std::abs(m(0, 0) * m(1, 1) - m(0, 1) * m(1, 0)); };
+      if (det(a) < 0.3 || det(h) < 0.3) continue;
+      const Matrix<2> p = cairn::symmetrised(Matrix<2>(a * a.transpose()));
+      const bool beside = random.below(2) == 0;
+      Slam belief;
+      const auto seen = belief.add(Vector<2>(0, 0), p).id;
+      const auto other = beside ? belief.augment(Copy{r}, Vector<1>(0.0), seen).id : seen;
+      const cairn::LinearSensor<2, 2> sensor{h, r * Matrix<2>::Identity()};
+      const Status status = JointExtended{}.update(belief, sensor, Vector<2>(0.1, 0.2), seen).status;
+      (status == Status::accepted ? accepted : refused) += 1;
+      if (!beside) REQUIRE(status == Status::accepted);
+      if (r > 1e-9) REQUIRE(status == Status::accepted);
+      if (status != Status::accepted) continue;
+      std::array<Long, 3> information = inverse({p(0, 0), p(0, 1), p(1, 1)});
+      for (int k = 0; k < 2; ++k) {
+        information[0] += Long(h(k, 0)) * h(k, 0) / r;
+        information[1] += Long(h(k, 0)) * h(k, 1) / r;
+        information[2] += Long(h(k, 1)) * h(k, 1) / r;
+      }
+      const std::array<Long, 3> exact = inverse(information);
+      for (int i = 0; i < 2; ++i) {
+        const Long want = exact[static_cast<std::size_t>(2 * i)];
+        CAPTURE(r);
+        CHECK(std::abs(static_cast<double>(belief.covariance(seen)(i, i) / want - 1)) < 2e-3);
+        if (beside)
+          CHECK(std::abs(static_cast<double>(belief.covariance(other)(i, i) / (want + r) - 1)) < 0.05);
+      }
+    }
+    CHECK(accepted > 1000);
+    CHECK(refused > 100);
+  }
+
   TEST_CASE("joint_gaussian: steps too long for a rotation are refused") {
     struct Attitude {
       using State = cairn::SO3;

@@ -273,9 +273,10 @@ public:
     return none == S(0);
   }
 
-  /// P - W W^T has digits left in every variance, and is a covariance where it was looked at.
-  [[nodiscard]] bool sound() {
-    if (!keeps_digits(true)) return false;
+  /// P - W W^T has digits left in every variance, and is a covariance where it was looked at. `share` is the
+  /// least of a diagonal element of H P H^T + R that its pivot is: what is lost there is lost in W.
+  [[nodiscard]] bool sound(const S& share) {
+    if (!keeps_digits(digits_left<S> / share)) return false;
     const int d = named_count();
     S* const left = work_.take(index(d) * index(d));
     for (int b = 0; b < d; ++b)
@@ -294,7 +295,7 @@ public:
   /// the result's size and not of the prior's. As A P H^T - K R is zero but for rounding, these rows are
   /// A_nn P_n: less a small correction: O(n d^2).
   [[nodiscard]] bool stabilise(std::span<const JacobianPart<S>> parts, const S* lower, const S* r) {
-    if (!keeps_digits(false)) return false;
+    if (!keeps_digits(S(0))) return false;
     const int d = named_count(), m = m_;
     S* const gain = gain_rows(lower);
     const View<S> h = jacobian_over_named(parts), hp = predicted_of_named(lower);
@@ -712,16 +713,21 @@ private:
     return pivoted_cholesky(copy, n, order_.data(), diagonal, rank);
   }
 
-  /// No variance shrinks to the rounding error of the one it is taken from.
-  [[nodiscard]] bool keeps_digits(bool named_too) const {
-    constexpr S least = S(4) * std::numeric_limits<S>::epsilon();
+  /// What is left of every variance has digits above the rounding of the one it is taken from: that of the
+  /// named rows, which can be had in another way, is at least so much of it; two digits of the others', for
+  /// which there is none.
+  [[nodiscard]] bool keeps_digits(const S& least_named) const {
+    constexpr S least = digits_left<S> / S(4);
     bool good = true;
     for (int i = 0; i < size(); ++i) {
       if (considered_[index(i)] != 0) continue;
       const S prior = p_.at(i, i);
       S lowered = prior;
       for (int k = 0; k < m_; ++k) lowered -= row(cross_, k)[i] * row(cross_, k)[i];
-      if (!(lowered >= least * prior) && (named_too || !is_named(i))) good = false;
+      if (lowered >= std::max(least, least_named) * prior) [[likely]]
+        continue;
+      const S needed = is_named(i) ? least_named : least;
+      good = good && (needed == S(0) || lowered >= needed * prior);
     }
     return good;
   }
