@@ -410,8 +410,7 @@ template <int M, class S>
 bool JointExtended::lowers(detail::JointCovariance<S>& core, std::span<const detail::JacobianPart<S>> parts,
                            const Cholesky<M, S>& root, const Matrix<M, M, S>& r) const {
   core.whiten(root.lower().data());
-  return (form == Form::standard && core.sound(root.least_share())) ||
-         core.stabilise(parts, root.lower().data(), r.data());
+  return (form == Form::standard && core.sound()) || core.stabilise(parts, root.lower().data(), r.data());
 }
 
 template <LinearisedProcess F, class... Kinds, class... X>

@@ -244,7 +244,12 @@ public:
 
   /// W = L^-1 U, for H P H^T + R = L L^T (m x m, column-major).
   void whiten(const S* lower) {
+    using std::sqrt;
+    losses_.resize(index(m_));
     for (int j = 0; j < m_; ++j) {
+      S diagonal(0);
+      for (int k = 0; k <= j; ++k) diagonal += lower[k * m_ + j] * lower[k * m_ + j];
+      losses_[index(j)] = sqrt(diagonal) / lower[j * m_ + j];
       for (int k = 0; k < j; ++k) add_scaled(row(cross_, j), row(cross_, k), -lower[k * m_ + j], stride_);
       scale(row(cross_, j), S(1) / lower[j * m_ + j]);
     }
@@ -273,10 +278,9 @@ public:
     return none == S(0);
   }
 
-  /// P - W W^T has digits left in every variance, and is a covariance where it was looked at. `share` is the
-  /// least of a diagonal element of H P H^T + R that its pivot is: what is lost there is lost in W.
-  [[nodiscard]] bool sound(const S& share) {
-    if (!keeps_digits(digits_left<S> / share)) return false;
+  /// P - W W^T has digits left in every variance, and is a covariance where it was looked at.
+  [[nodiscard]] bool sound() {
+    if (!keeps_digits(S(16) * digits_left<S>)) return false;
     const int d = named_count();
     S* const left = work_.take(index(d) * index(d));
     for (int b = 0; b < d; ++b)
@@ -713,21 +717,27 @@ private:
     return pivoted_cholesky(copy, n, order_.data(), diagonal, rank);
   }
 
-  /// What is left of every variance has digits above the rounding of the one it is taken from: that of the
-  /// named rows, which can be had in another way, is at least so much of it; two digits of the others', for
-  /// which there is none.
-  [[nodiscard]] bool keeps_digits(const S& least_named) const {
-    constexpr S least = digits_left<S> / S(4);
+  /// What is left of every variance has digits above the rounding of what is taken from it, that of row k of
+  /// W being the prior's by what the pivot k of H P H^T + R has lost: so many of the named rows, which can be
+  /// had in another way, and two of the others, for which there is none.
+  [[nodiscard]] bool keeps_digits(const S& of_named) const {
+    using std::abs;
+    using std::sqrt;
+    constexpr S of_others = digits_left<S> / S(4);
+    const S most = std::max(of_others, of_named) * static_cast<S>(m_) *
+                   (m_ > 0 ? *std::max_element(losses_.begin(), losses_.end()) : S(1));
     bool good = true;
     for (int i = 0; i < size(); ++i) {
       if (considered_[index(i)] != 0) continue;
       const S prior = p_.at(i, i);
       S lowered = prior;
       for (int k = 0; k < m_; ++k) lowered -= row(cross_, k)[i] * row(cross_, k)[i];
-      if (lowered >= std::max(least, least_named) * prior) [[likely]]
+      if (lowered >= most * prior) [[likely]]
         continue;
-      const S needed = is_named(i) ? least_named : least;
-      good = good && (needed == S(0) || lowered >= needed * prior);
+      S rounded(0);
+      for (int k = 0; k < m_; ++k) rounded += abs(row(cross_, k)[i]) * losses_[index(k)];
+      const S needed = (is_named(i) ? of_named : of_others) * sqrt(prior) * rounded;
+      good = good && (needed == S(0) || lowered >= needed);
     }
     return good;
   }
@@ -770,6 +780,7 @@ private:
   std::vector<int> named_rows_, where_, order_, certain_, kept_, moved_;
   std::size_t stride_ = 0;
   int m_ = 0;
+  std::vector<S> losses_;  // by row of W: how many times its rounding is that of P
   bool is_finite_ = true;
   S *gathered_ = nullptr, *cross_ = nullptr, *less_ = nullptr, *step_ = nullptr, *stabilised_ = nullptr,
     *added_ = nullptr, *corner_ = nullptr;
