@@ -20,6 +20,7 @@
 
 #include "support/linear_slam.hpp"
 #include "support/random.hpp"
+#include "support/violation.hpp"
 
 namespace landmark_map_test {
 namespace {
@@ -400,6 +401,11 @@ TEST_SUITE("slam/landmark_map") {
     CHECK(words_of([&] {
             static_cast<void>(FromLandmarks{}(map, singular, {}, random));
           }).find("uncertain in every direction, found a singular covariance") != std::string::npos);
+    for (const FromLandmarks& wrong : {FromLandmarks{.iterations = 0}, FromLandmarks{.associations = 0},
+                                       FromLandmarks{.hypotheses = -1}})  // would drive blindly
+      CHECK_FALSE(cairn_test::violation_of([&] {
+                    static_cast<void>(wrong(map, {SE2(), 0.01 * Matrix<3>::Identity()}, {}, random));
+                  }).empty());
     // an empty map, nothing seen, a robot that stands on what it sees
     CHECK(map.choose(SE2(), {}, random).choice.empty());
     map.insert(SE2(), {});

@@ -110,7 +110,9 @@ concept LandmarkSensor =
       { l.initialise(x, z) } -> StateOf<typename L::Part>;
     };
 
-/// What was seen, and of which landmark where the sensor knows (a bar code): any small number.
+/// What was seen, and of which landmark where the sensor knows (a bar code): any small number. That is then
+/// the landmark's number in the map. Landmarks that begin without one take the number after the largest, and
+/// an identity that comes later and is that number is taken for theirs: do not mix the two in such an order.
 template <std::copyable Z>
 struct LandmarkSighting {
   Z z;
@@ -381,10 +383,10 @@ private:
 struct FromLandmarks {
   enum class Weight { exact, evidence };
   Weight weight = Weight::exact;
-  int iterations = 1;  ///< of each sighting's update: more where the sensor bends over the pose's spread
+  int iterations = 1;  ///< of each sighting's update, > 0: more where the sensor bends over the pose's spread
   /// How often it is chosen which landmarks the sightings are of: with the pose as the motion leaves it, then
   /// again with the pose as that choice makes it, which tells neighbours apart that the motion cannot.
-  int associations = 1;
+  int associations = 1;  ///< > 0
   /// Above 0: the motion leaves more room than neighbours are apart. Candidates, those of sightings that have
   /// several first, are taken in alone, one after the other; each decides what the other sightings are of,
   /// and the decision under which all are likeliest together stays (after J. Civera, O. Grasa, A. Davison,
@@ -399,6 +401,8 @@ struct FromLandmarks {
                                                          const Gaussian<typename L::State>& motion,
                                                          const typename LandmarkMap<L, F>::Observation& z,
                                                          Random& random) const {
+    CAIRN_EXPECTS(iterations > 0 && associations > 0 && hypotheses >= 0,
+                  "FromLandmarks updates and chooses once at least");
     const double log_volume = Cholesky<dof<typename L::State>>(motion.covariance).log_determinant();
     if (!std::isfinite(log_volume))
       raise(
