@@ -70,56 +70,58 @@ std::optional<Reference> reference_of(const SurfacePatch& patch) {
   return result;
 }
 
-/// (1): where the other camera sees offset o, up to the third coordinate.
-struct Sight {
+/// Where an image shows offset o of the patch: (1), and what the camera makes of it, whose distortion is
+/// taken as it is in the middle. Of the three coordinates the third divides the others.
+struct Warp {
   cairn::Vector<3> middle, right, down;
-  [[nodiscard]] cairn::Vector<3> operator()(double x, double y) const {
-    return middle + x * right + y * down;
+  [[nodiscard]] cairn::Vector<3> undivided(double x, double y) const { return middle + x * right + y * down; }
+  [[nodiscard]] cairn::Vector<2> operator()(const cairn::Vector<2>& o) const {
+    const cairn::Vector<3> p = undivided(o(0), o(1));
+    return p.head<2>() / p(2);
   }
 };
 
-std::optional<Sight> sight_of(const SurfacePatch& patch, const cairn::PinholeCamera& camera,
-                              const cairn::SE3& T_now_then, double inverse_depth) {
+std::optional<Warp> warp_of(const SurfacePatch& patch, const cairn::PinholeCamera& camera,
+                            const cairn::SE3& T_now_then, double inverse_depth) {
   const auto ray = camera.normalise_with_jacobian(patch.pixel);
   if (!ray) return std::nullopt;
   const cairn::Matrix<2> J = inverse(ray->J_pixel);
   const cairn::Vector<3> t = inverse_depth * T_now_then.translation();
   const cairn::Matrix<3> R = T_now_then.rotation().matrix();
-  const auto moved = [&](const cairn::Vector<2>& n, double one) {
+  const auto turned = [&](const cairn::Vector<2>& n, double one) {
     return cairn::Vector<3>(R * cairn::Vector<3>(n(0), n(1), one));
   };
-  return Sight{moved(ray->normalised, 1) + t, moved(J.col(0), 0) + patch.slope(0) * t,
-               moved(J.col(1), 0) + patch.slope(1) * t};
+  const cairn::Vector<3> middle = turned(ray->normalised, 1) + t;
+  constexpr double nearest = 0.1;  // of the depth then: much nearer it is a blur, and no camera is in it
+  if (!(middle(2) > nearest)) return std::nullopt;
+  const cairn::Vector<2> at = middle.head<2>() / middle(2);
+  cairn::Matrix<3> to_pixels;
+  to_pixels << camera.distortion_jacobian(at), camera.distort(at) - camera.distortion_jacobian(at) * at, 0, 0,
+      1;
+  return Warp{to_pixels * middle, to_pixels * (turned(J.col(0), 0) + patch.slope(0) * t),
+              to_pixels * (turned(J.col(1), 0) + patch.slope(1) * t)};
 }
 
-/// Pixels of the image for offsets: the camera's distortion is taken as it is in the middle.
-class Warp {
-public:
-  Warp(const Sight& sight, const cairn::PinholeCamera& camera, const cairn::Vector<2>& normalised)
-      : sight_(sight),
-        at_(normalised),
-        pixel_(camera.distort(normalised)),
-        J_(camera.distortion_jacobian(normalised)) {}
-  [[nodiscard]] cairn::Vector<2> operator()(double x, double y) const {
-    const cairn::Vector<3> q = sight_(x, y);
-    return pixel_ + J_ * (q.head<2>() / q(2) - at_);
-  }
-
-private:
-  Sight sight_;
-  cairn::Vector<2> at_, pixel_;
-  cairn::Matrix<2> J_;
-};
-
-/// The patch as the image has it when its offsets are shifted by d.
-bool look(const Warp& warp, const cairn::Vector<2>& d, cairn::ImageView image, Grey& grey) {
+/// The pixels that the patch has around offset o, as the image shows them.
+bool look(const Warp& warp, const cairn::Vector<2>& o, cairn::ImageView image, Grey& grey) {
+  // What is in front of the camera is shown between what its corners are.
   const double right = image.width() - 2, bottom = image.height() - 2;
-  for (int v = -half, i = 0; v <= half; ++v)
-    for (int u = -half; u <= half; ++u, ++i) {
-      const cairn::Vector<2> p = warp(u + d(0), v + d(1));
-      if (!(p(0) >= 0 && p(1) >= 0 && p(0) < right && p(1) < bottom)) return false;
-      grey(i) = grey_level(image, static_cast<float>(p(0)), static_cast<float>(p(1)));
+  for (const int v : {-half, half})
+    for (const int u : {-half, half}) {
+      const cairn::Vector<3> p = warp.undivided(o(0) + u, o(1) + v);
+      if (!(p(2) > 0 && p(0) >= 0 && p(1) >= 0 && p(0) < right * p(2) && p(1) < bottom * p(2))) return false;
     }
+  for (int v = -half, i = 0; v <= half; ++v) {
+    const cairn::Vector<3> row = warp.undivided(o(0) - half, o(1) + v);
+    std::array<float, static_cast<std::size_t>(across)> x{}, y{};
+    for (std::size_t u = 0; u < x.size(); ++u) {
+      const auto steps = static_cast<double>(static_cast<int>(u));
+      const double scale = 1 / (row(2) + steps * warp.right(2));
+      x[u] = static_cast<float>((row(0) + steps * warp.right(0)) * scale);
+      y[u] = static_cast<float>((row(1) + steps * warp.right(1)) * scale);
+    }
+    for (std::size_t u = 0; u < x.size(); ++u, ++i) grey(i) = grey_level(image, x[u], y[u]);
+  }
   return true;
 }
 
@@ -127,11 +129,14 @@ bool look(const Warp& warp, const cairn::Vector<2>& d, cairn::ImageView image, G
 
 std::optional<SurfacePatch> SurfacePatch::of(cairn::ImageView image, const cairn::Vector<2>& pixel,
                                              const cairn::Vector<2>& slope, std::size_t keyframe) {
+  constexpr int before = half + 1;  // of the pixels kept, so many precede the one that the place is in
+  const double left = std::floor(pixel(0)) - before, top = std::floor(pixel(1)) - before;
+  if (!(left >= 0 && top >= 0 && left + side <= image.width() && top + side <= image.height()))
+    return std::nullopt;
   SurfacePatch patch{pixel, slope, keyframe, {}};
-  const int left = static_cast<int>(std::floor(pixel(0))) - half - 1;
-  const int top = static_cast<int>(std::floor(pixel(1))) - half - 1;
-  if (left < 0 || top < 0 || left + side > image.width() || top + side > image.height()) return std::nullopt;
-  for (int y = 0; y < side; ++y) std::copy_n(image.row(top + y) + left, side, patch.grey.data() + y * side);
+  for (int y = 0; y < side; ++y)
+    std::copy_n(image.row(static_cast<int>(top) + y) + static_cast<int>(left), side,
+                patch.grey.data() + y * side);
   return patch;
 }
 
@@ -139,19 +144,23 @@ std::optional<FoundPatch> find_patch(const SurfacePatch& patch, const cairn::Pin
                                      const cairn::SE3& T_now_then, double inverse_depth,
                                      cairn::ImageView image, const cairn::Vector<2>& expected) {
   constexpr int most_steps = 10;
-  constexpr double farthest = 2, settled = 0.005;
+  constexpr double farthest = 2, settled = 0.005;  // [pixels of the patch]
+  const auto warp = warp_of(patch, camera, T_now_then, inverse_depth);
+  if (!warp) return std::nullopt;  // before what expects a place that is one
   const auto reference = reference_of(patch);
-  const auto sight = sight_of(patch, camera, T_now_then, inverse_depth);
-  if (!reference || !sight || !(sight->middle(2) > 0.1)) return std::nullopt;
-  const cairn::Vector<2> normalised = sight->middle.head<2>() / sight->middle(2);
-  const Warp warp(*sight, camera, normalised);
+  if (!reference) return std::nullopt;
+  const cairn::Vector<2> x(0.5, 0), y(0, 0.5);
   cairn::Matrix<2> J;  // d pixel / d offset
-  J << warp(0.5, 0) - warp(-0.5, 0), warp(0, 0.5) - warp(0, -0.5);
-  if (!(determinant(J) > 0)) return std::nullopt;  // seen from behind
-  cairn::Vector<2> d = inverse(J) * (expected - warp(0, 0));
+  J << (*warp)(x) - (*warp)(-x), (*warp)(y) - (*warp)(-y);
+  // A piece seen from behind has a negative area; of one seen on its edge, or from four times as far, too few
+  // pixels are left to compare.
+  constexpr double least_area = 1.0 / 16;
+  if (!(determinant(J) > least_area)) return std::nullopt;
+  cairn::Vector<2> d = inverse(J) * (expected - (*warp)({0, 0}));
   Grey grey;
   for (int step = 0; step < most_steps; ++step) {
-    if (!(d.norm() <= farthest + 1) || !look(warp, d, image, grey)) return std::nullopt;
+    // On its way it may go farther than it may end.
+    if (!(d.norm() <= farthest + 1) || !look(*warp, d, image, grey)) return std::nullopt;
     const float norm = centre(grey);
     if (!(norm > 0)) return std::nullopt;
     const Grey difference = grey * (reference->norm / norm) - reference->grey;
@@ -163,9 +172,10 @@ std::optional<FoundPatch> find_patch(const SurfacePatch& patch, const cairn::Pin
     if (d.norm() > farthest) return std::nullopt;
     const float squares = difference.square().sum();
     FoundPatch found;
-    found.pixel = warp(d(0), d(1));
+    found.pixel = (*warp)(d);
     found.correlation = 1 - 0.5 * squares / (reference->norm * reference->norm);
     const cairn::Matrix<2> covariance = J * reference->inverse.cast<double>() * J.transpose();
+    // Four numbers were fitted: where it is, gain and offset.
     found.sigma = std::sqrt(squares / (pixels - 4) * 0.5 * covariance.trace());
     return found;
   }

@@ -26,7 +26,10 @@
 
 namespace stereo_slam {
 
-/// A piece of an image and of the plane that it shows.
+/// A piece of an image and of the plane that it shows. Its place is wherever between pixels a landmark was
+/// found: looked at from the same distance, patches around whole pixels would all lie at one part of a pixel,
+/// and what linear interpolation does wrong there would turn the camera instead of averaging out
+/// (docs/design.md).
 struct SurfacePatch {
   static constexpr int half = 5;             ///< it reaches so far to every side of its centre [pixels]
   static constexpr int side = 2 * half + 4;  ///< of what is kept: slopes and the part of a pixel need more
@@ -35,7 +38,7 @@ struct SurfacePatch {
   std::size_t keyframe = 0;                           ///< that took the image
   std::array<std::uint8_t, static_cast<std::size_t>(side* side)> grey{};
 
-  /// Nothing where it leaves the image.
+  /// Nothing where it leaves the image, or the place is none.
   [[nodiscard]] static std::optional<SurfacePatch> of(cairn::ImageView image, const cairn::Vector<2>& pixel,
                                                       const cairn::Vector<2>& slope, std::size_t keyframe);
 };
@@ -48,8 +51,8 @@ struct FoundPatch {
 
 /// Where the patch is in `image`. `T_now_then` leads from the camera that took it to the one of `image`, and
 /// `inverse_depth` is that of its centre there [1/m]; the search begins at `expected`. Nothing where the
-/// patch leaves the image, is seen from behind, shows no place in both directions, is more than 2 of its own
-/// pixels away or does not settle.
+/// patch leaves the image, is seen from behind or on its edge, shows no place in both directions, is more
+/// than 2 of its own pixels away or does not settle.
 [[nodiscard]] std::optional<FoundPatch> find_patch(const SurfacePatch& patch,
                                                    const cairn::PinholeCamera& camera,
                                                    const cairn::SE3& T_now_then, double inverse_depth,

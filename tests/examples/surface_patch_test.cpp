@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 
 #include <doctest/doctest.h>
 
@@ -150,8 +151,57 @@ TEST_SUITE("surface_patch") {
     CHECK_FALSE(find(patch, SE3(SO3::exp({0, 3.1, 0}), Point(0, 0, 0)), first, pixel));  // looks away
     const SurfacePatch flat = *SurfacePatch::of(cairn::Image(width, height, 90), pixel, {0, 0}, 0);
     CHECK_FALSE(find(flat, SE3(), first, pixel));
-    CHECK_FALSE(SurfacePatch::of(first, {4, 100}, {0, 0}, 0));
-    CHECK_FALSE(SurfacePatch::of(first, {100, height - 3}, {0, 0}, 0));
+    // Stripes show no place along themselves.
+    cairn::Image stripes(width, height);
+    for (int y = 0; y < height; ++y)
+      for (int x = 0; x < width; ++x)
+        stripes(x, y) = static_cast<std::uint8_t>(128 + 100 * std::sin(0.7 * x));
+    CHECK_FALSE(find(*SurfacePatch::of(stripes, pixel, {0, 0}, 0), SE3(), stripes, pixel));
+    // On its edge: a camera in the plane that looks at the place. Every pixel of the patch lies on one line.
+    const Point eye = -Plane().normal;
+    const Point to = depth(pixel) * *camera().unproject(pixel) - eye;
+    const SE3 on_edge(SO3::exp({-std::atan2(to(1), to(2)), 0, 0}), eye);
+    const auto there = camera().project(on_edge.inverse() * (eye + to));
+    REQUIRE(there);
+    REQUIRE(camera().contains(*there, 20));
+    CHECK_FALSE(find(patch, on_edge.inverse(), first, *there));
+  }
+
+  TEST_CASE("find_patch: numbers that are none give no answer") {
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN(), infinity = HUGE_VAL;
+    const cairn::Image first = picture(SE3(), 1, 0);
+    const cairn::Vector<2> pixel(160, 150);
+    const SurfacePatch patch = *SurfacePatch::of(first, pixel, slope(pixel), 0);
+    for (const double bad : {nan, infinity, -infinity, 1e300}) {
+      CAPTURE(bad);
+      CHECK_FALSE(SurfacePatch::of(first, {bad, 100}, {0, 0}, 0));
+      CHECK_FALSE(SurfacePatch::of(first, {100, bad}, {0, 0}, 0));
+      CHECK_FALSE(stereo_slam::find_patch(patch, camera(), SE3(), 1, first, {bad, 150}));
+      const SE3 gone(SO3(), Point(bad, 0, 0));
+      CHECK_FALSE(stereo_slam::find_patch(patch, camera(), gone, 1, first, pixel));
+      CHECK_FALSE(stereo_slam::find_patch(patch, camera(), moved().inverse(), bad, first, pixel));
+      SurfacePatch steep = patch;
+      steep.slope(1) = bad;
+      CHECK_FALSE(stereo_slam::find_patch(steep, camera(), moved().inverse(), 1, first, pixel));
+      steep.pixel(0) = bad;
+      CHECK_FALSE(stereo_slam::find_patch(steep, camera(), SE3(), 1, first, pixel));
+    }
+  }
+
+  TEST_CASE("surface_patch: reaches up to the rim of its image, and no farther") {
+    const cairn::Image image(width, height, 90);
+    const auto fits = [&](double x, double y) {
+      return SurfacePatch::of(image, {x, y}, {0, 0}, 0).has_value();
+    };
+    constexpr int before = SurfacePatch::half + 1, after = SurfacePatch::half + 2;
+    CHECK(fits(before, before));
+    CHECK(fits(width - after - 0.01, height - after - 0.01));
+    CHECK_FALSE(fits(before - 0.01, 100));
+    CHECK_FALSE(fits(100, before - 0.01));
+    CHECK_FALSE(fits(width - after, 100));
+    CHECK_FALSE(fits(100, height - after));
+    CHECK_FALSE(SurfacePatch::of(cairn::Image(5, 5), {2, 2}, {0, 0}, 0));
+    CHECK_FALSE(SurfacePatch::of({}, {0, 0}, {0, 0}, 0));
   }
 }
 
