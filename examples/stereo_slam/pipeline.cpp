@@ -507,8 +507,10 @@ void Pipeline::make_keyframe(const Located& located, const StereoFrame& frame, F
 /// Local landmarks without a partner are new.
 void Pipeline::add_landmarks(const std::vector<Match>& known, const StereoFrame& frame) {
   // A patch says where its landmark is to a twentieth of a pixel, and lenses that are wrong by more do not
-  // let it: on a recorded drive that nothing was chosen on, patches doubled the error.
-  const bool with_patches = options_.patches && !map_.rig_correction();
+  // let it: on a recorded drive that nothing was chosen on, patches doubled the error. Of a rig that comes
+  // loose they make less of an error, and nine times more than the covariance says.
+  const bool with_patches =
+      options_.patches && !map_.rig_correction() && options_.calibrate != Calibration::drifting;
   std::vector<std::uint8_t> taken(locals_.size(), 0);
   for (const Match& match : known) taken[match.local] = 1;
   for (std::uint32_t i = 0; i < locals_.size(); ++i) {

@@ -15,6 +15,7 @@
 #include <cairn/core/ode.hpp>
 #include <cairn/core/parallel.hpp>
 #include <cairn/core/random.hpp>
+#include <cairn/core/reset_on_move.hpp>
 #include <cairn/core/sizes.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/core/symmetric_eigen.hpp>

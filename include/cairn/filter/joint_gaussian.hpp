@@ -60,6 +60,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/core/reset_on_move.hpp>
 #include <cairn/filter/detail/covariance.hpp>
 #include <cairn/filter/detail/joint_covariance.hpp>
 #include <cairn/filter/detail/plain_matrix.hpp>
@@ -646,7 +647,7 @@ private:
   std::vector<Slot> slots_;
   std::vector<std::uint32_t> free_slots_;
   std::vector<AnyBlockId> order_;
-  detail::MovedCount dof_;
+  ResetOnMove<int> dof_;
 };
 
 }}  // namespace cairn::CAIRN_ABI

@@ -47,6 +47,7 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/reset_on_move.hpp>
 #include <cairn/index/collectors.hpp>
 #include <cairn/index/detail/answers.hpp>
 #include <cairn/index/detail/block_lanes.hpp>
@@ -56,7 +57,6 @@
 #include <cairn/index/detail/byte_scale.hpp>
 #include <cairn/index/detail/cell_search.hpp>
 #include <cairn/index/detail/k_means.hpp>
-#include <cairn/index/detail/reset_on_move.hpp>
 #include <cairn/index/metric.hpp>
 #include <cairn/index/points.hpp>
 
@@ -382,7 +382,7 @@ private:
 
   const Points* points_;
   DescriptorIndexOptions options_;
-  detail::ResetOnMove<std::size_t> size_;
+  ResetOnMove<std::size_t> size_;
   detail::ByteScale scale_;
   float error_ = 0;     ///< what rounding misses of any point at most, in bytes
   bool inside_ = true;  ///< whether all points are in the box of bytes

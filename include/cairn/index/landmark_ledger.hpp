@@ -14,8 +14,8 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/reset_on_move.hpp>
 #include <cairn/index/collectors.hpp>
-#include <cairn/index/detail/reset_on_move.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
 
@@ -166,11 +166,11 @@ private:
   }
 
   Probation probation_;
-  detail::ResetOnMove<std::uint32_t> step_;
+  ResetOnMove<std::uint32_t> step_;
   std::vector<Record> records_;
   std::vector<LandmarkId> on_probation_;
-  detail::ResetOnMove<std::size_t> probation_size_;
-  detail::ResetOnMove<std::size_t> base_size_;
+  ResetOnMove<std::size_t> probation_size_;
+  ResetOnMove<std::size_t> base_size_;
 };
 
 }}  // namespace cairn::CAIRN_ABI

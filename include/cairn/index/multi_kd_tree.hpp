@@ -39,11 +39,11 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/reset_on_move.hpp>
 #include <cairn/index/detail/answers.hpp>
 #include <cairn/index/detail/forest_queries.hpp>
 #include <cairn/index/detail/lockstep_search.hpp>
 #include <cairn/index/detail/logarithmic_forest.hpp>
-#include <cairn/index/detail/reset_on_move.hpp>
 #include <cairn/index/kd_tree.hpp>
 #include <cairn/index/multi_tree_shape.hpp>
 
@@ -299,11 +299,11 @@ private:
   };
 
   [[no_unique_address]] M metric_;
-  detail::ResetOnMove<std::size_t> dim_;
+  ResetOnMove<std::size_t> dim_;
   detail::LogarithmicForest<Tree> forest_;
   std::vector<PointState> state_;
-  detail::ResetOnMove<std::size_t> live_;
-  detail::ResetOnMove<std::uint64_t> updates_;  ///< points inserted and erased so far
+  ResetOnMove<std::size_t> live_;
+  ResetOnMove<std::uint64_t> updates_;  ///< points inserted and erased so far
 };
 
 /// Coordinates that nobody named would be rounded to some type's.

@@ -32,10 +32,10 @@
 #include <vector>
 
 #include <cairn/core/parallel.hpp>
+#include <cairn/core/reset_on_move.hpp>
 #include <cairn/core/sizes.hpp>
 #include <cairn/index/collectors.hpp>
 #include <cairn/index/detail/block_lanes.hpp>
-#include <cairn/index/detail/reset_on_move.hpp>
 #include <cairn/index/metric.hpp>
 #include <cairn/index/points.hpp>
 #include <cairn/index/ratio_test.hpp>
@@ -92,7 +92,7 @@ private:
   }
 
   std::size_t dim_ = 0;
-  detail::ResetOnMove<std::size_t> count_;
+  ResetOnMove<std::size_t> count_;
   float largest_square_ = 0;
   detail::AlignedVector<float> coordinates_;
   detail::AlignedVector<float> squares_;

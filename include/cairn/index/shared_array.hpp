@@ -15,7 +15,7 @@
 #include <cstddef>
 
 #include <cairn/core/counted.hpp>
-#include <cairn/index/detail/reset_on_move.hpp>
+#include <cairn/core/reset_on_move.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
@@ -77,9 +77,9 @@ private:
 
   static inline const T blank{};
   Counted<Branch> root_;
-  detail::ResetOnMove<int> height_;  // levels of branches
-  detail::ResetOnMove<std::size_t> size_;
-  detail::ResetOnMove<std::size_t> copies_;
+  ResetOnMove<int> height_;  // levels of branches
+  ResetOnMove<std::size_t> size_;
+  ResetOnMove<std::size_t> copies_;
 };
 
 }}  // namespace cairn::CAIRN_ABI

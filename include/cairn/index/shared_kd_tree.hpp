@@ -24,7 +24,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/counted.hpp>
-#include <cairn/index/detail/reset_on_move.hpp>
+#include <cairn/core/reset_on_move.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
@@ -235,7 +235,7 @@ private:
   }
 
   Below root_;
-  detail::ResetOnMove<std::size_t> copies_;
+  ResetOnMove<std::size_t> copies_;
 };
 
 }}  // namespace cairn::CAIRN_ABI

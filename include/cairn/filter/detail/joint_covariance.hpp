@@ -772,7 +772,7 @@ private:
 
   SymmetricRows<S> p_;
   std::vector<unsigned char> free_, considered_;  // by row
-  MovedCount free_count_, considered_count_;
+  ResetOnMove<int> free_count_, considered_count_;
 
   // Of the step that is being made.
   Workspace<S> work_;

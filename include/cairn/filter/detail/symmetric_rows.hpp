@@ -14,9 +14,9 @@
 #include <cstring>
 #include <span>
 #include <type_traits>
-#include <utility>
 #include <vector>
 
+#include <cairn/core/reset_on_move.hpp>
 #include <cairn/filter/detail/register_column.hpp>
 #include <cairn/version.hpp>
 
@@ -58,31 +58,6 @@ template <class T>
 void room_for(std::vector<T>& list, std::size_t count) {
   if (list.capacity() < count) list.reserve(std::max(count, 2 * list.capacity()));
 }
-
-/// A number that counts what a container beside it holds: nothing where that was moved away.
-class MovedCount {
-public:
-  MovedCount() = default;
-  MovedCount(const MovedCount&) = default;
-  MovedCount(MovedCount&& other) noexcept : number_(std::exchange(other.number_, 0)) {}
-  MovedCount& operator=(const MovedCount&) = default;
-  MovedCount& operator=(MovedCount&& other) noexcept {
-    number_ = std::exchange(other.number_, 0);
-    return *this;
-  }
-  ~MovedCount() = default;
-  MovedCount& operator=(int number) noexcept {
-    number_ = number;
-    return *this;
-  }
-  MovedCount& operator+=(int number) noexcept { return *this = number_ + number; }
-  MovedCount& operator-=(int number) noexcept { return *this = number_ - number; }
-  // NOLINTNEXTLINE(google-explicit-constructor): stands for the number
-  operator int() const noexcept { return number_; }
-
-private:
-  int number_ = 0;
-};
 
 template <class S>
 class SymmetricRows {
@@ -266,7 +241,7 @@ private:
   }
 
   std::vector<CacheLine<S>> lines_;
-  MovedCount size_;
+  ResetOnMove<int> size_;
 };
 
 }}}  // namespace cairn::CAIRN_ABI::detail

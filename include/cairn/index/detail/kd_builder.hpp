@@ -17,11 +17,11 @@
 #include <vector>
 
 #include <cairn/core/parallel.hpp>
+#include <cairn/core/reset_on_move.hpp>
 #include <cairn/index/detail/box_tree.hpp>
 #include <cairn/index/detail/kd_layout.hpp>
 #include <cairn/index/detail/kd_split.hpp>
 #include <cairn/index/detail/leaf_blocks.hpp>
-#include <cairn/index/detail/reset_on_move.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include <cairn/index/detail/reset_on_move.hpp>
+#include <cairn/core/reset_on_move.hpp>
 #include <cairn/index/detail/tree_merge.hpp>
 #include <cairn/index/kd_tree.hpp>
 #include <cairn/index/multi_tree_shape.hpp>

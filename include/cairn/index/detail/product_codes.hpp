@@ -39,10 +39,10 @@
 #include <vector>
 
 #include <cairn/core/parallel.hpp>
+#include <cairn/core/reset_on_move.hpp>
 #include <cairn/index/detail/block_lanes.hpp>
 #include <cairn/index/detail/byte_kernels.hpp>
 #include <cairn/index/detail/code_tables.hpp>
-#include <cairn/index/detail/reset_on_move.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 

@@ -10,9 +10,10 @@
 
 #include <cairn/version.hpp>
 
-namespace cairn { inline namespace CAIRN_ABI { namespace detail {
+namespace cairn { inline namespace CAIRN_ABI {
 
-/// Used as the T that it holds: by conversion where that is a number, by -> where it is a class.
+/// Used as the T that it holds: by conversion where that is a number, by -> where it is a class. An object
+/// with such members needs no move operations of its own. Moving does not throw where T's copy does not.
 template <class T>
 class ResetOnMove {
 public:
@@ -42,4 +43,4 @@ private:
   T value_{};
 };
 
-}}}  // namespace cairn::CAIRN_ABI::detail
+}}  // namespace cairn::CAIRN_ABI
