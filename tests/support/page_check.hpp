@@ -4,7 +4,7 @@
 /// @file
 /// What every report page promises: nothing on the console, nothing from a network, nothing that axe-core
 /// finds in light or dark, a button at every figure that saves it as a PNG file, and on a phone nothing wider
-/// than its screen. CAIRN_AXE says where npm has put axe-core.
+/// than its screen, at a desk no table cut off. CAIRN_AXE says where npm has put axe-core.
 #pragma once
 
 #include <filesystem>
@@ -51,6 +51,13 @@ constexpr const char* examiner = R"(<script>
     return [`${root.scrollWidth} px wide of ${root.clientWidth}: ${out.slice(0, 3).map(short).join(' ')}`];
   }
 
+  /** Tables that have to be pushed aside to be read although the page has more room than they were given. */
+  function cutTables() {
+    return [...document.querySelectorAll('.panel:not(.wide) .scroll')]
+      .filter((node) => !phone && node.scrollWidth > node.clientWidth + 1)
+      .map((node) => `${node.ariaLabel}: ${node.scrollWidth} px of table in ${node.clientWidth}`);
+  }
+
   /** The width and the height that the first bytes of a PNG file say; zeros where it is none. */
   function sizeOfPng(bytes) {
     const signature = [0x89, 0x50, 0x4e, 0x47, 0x0d, 0x0a, 0x1a, 0x0a];
@@ -92,7 +99,7 @@ constexpr const char* examiner = R"(<script>
 
   async function look() {
     await wait(1500);
-    const found = [...tooWide(), ...(await unsaved()), ...(await violations()), ...fetched()];
+    const found = [...tooWide(), ...cutTables(), ...(await unsaved()), ...(await violations()), ...fetched()];
     const answer = found.length > 0 ? found.join('; ') : 'well';
     if (phone) return parent.postMessage(answer, '*');
     document.documentElement.dataset.desk = answer;

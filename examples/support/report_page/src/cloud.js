@@ -39,7 +39,7 @@ function paint(colours, colouring, values) {
   return [low, high];
 }
 
-/** Middle and radius of what matters: the bulk of the points, and every line. */
+/** The box of what matters, the bulk of the points and every line, its middle and radius. */
 function frameOf(positions, curves) {
   const low = new Vector3();
   const high = new Vector3();
@@ -55,7 +55,7 @@ function frameOf(positions, curves) {
     high[axis] = Number.isFinite(bounds[1]) ? bounds[1] : 1;
   }
   const middle = low.clone().add(high).multiplyScalar(0.5);
-  return { middle, low, radius: Math.max(0.5 * low.distanceTo(high), 0.1) };
+  return { middle, low, high, radius: Math.max(0.5 * low.distanceTo(high), 0.1) };
 }
 
 /** 1, 2 or 5 times a power of ten, about a tenth of the span. */
@@ -112,17 +112,32 @@ class View {
     canvas.addEventListener('pointerdown', () => (this.controls.enableZoom = true));
     canvas.addEventListener('pointerleave', () => (this.controls.enableZoom = false));
     this.controls.addEventListener('change', () => this.draw());
+    this.controls.addEventListener('start', () => (this.direction = null));
     // One finger scrolls the page, two turn and zoom.
     this.controls.touches = { ONE: null, TWO: TOUCH.DOLLY_ROTATE };
     canvas.style.touchAction = 'pan-y';
     canvas.addEventListener('beforesave', () => this.drawNow());
   }
 
-  /** From the direction (x, y, z), everything in view. */
+  /** From the direction (x, y, z), everything in view, until the reader takes hold of it. */
   look(x, y, z) {
-    const { middle, radius } = this.frame;
-    const distance = (0.8 * radius) / Math.tan((this.camera.fov * Math.PI) / 360);
-    this.camera.position.copy(middle).addScaledVector(new Vector3(x, y, z).normalize(), distance);
+    this.direction = new Vector3(x, y, z).normalize();
+    this.fit();
+  }
+
+  /** As near as the corners of the box allow: what is flat or long would be small in the view of its sphere. */
+  fit() {
+    const { middle, low, high, radius } = this.frame;
+    const right = new Vector3().crossVectors(this.camera.up, this.direction).normalize();
+    const upwards = new Vector3().crossVectors(this.direction, right);
+    const tangent = Math.tan((this.camera.fov * Math.PI) / 360);
+    let distance = radius;
+    for (let i = 0; i < 8; ++i) {
+      const corner = new Vector3(i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z).sub(middle);
+      const aside = Math.max(Math.abs(corner.dot(right)) / this.camera.aspect, Math.abs(corner.dot(upwards)));
+      distance = Math.max(distance, corner.dot(this.direction) + (1.05 * aside) / tangent);
+    }
+    this.camera.position.copy(middle).addScaledVector(this.direction, distance);
     this.camera.near = radius / 500;
     this.camera.far = 200 * radius;
     this.camera.updateProjectionMatrix();
@@ -148,6 +163,7 @@ class View {
     this.renderer.setSize(width, height, false);
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
+    if (this.direction) this.fit();
     this.draw();
   }
 
