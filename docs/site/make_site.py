@@ -67,6 +67,8 @@ def tidied(site):
         text = re.sub(r'<a href="javascript:[^"]*"[^>]*>(.*?)</a>', r"\1", text, flags=re.DOTALL)
         text = re.sub(r'<div class="headertitle">\s*<div class="title">(.*?)</div>\s*</div>',
                       r'<div class="headertitle"><h1 class="title">\1</h1></div>', text, flags=re.DOTALL)
+        # Doxygen shows the tags of code in a heading instead of following them.
+        text = re.sub(r"&lt;(/?)tt&gt;", r"<\1code>", text)
         # What scrolls can be reached by the keyboard.
         text = re.sub(r'<(div|pre) class="(fragment|memproto)">', r'<\1 class="\2" tabindex="0">', text)
         # Doxygen begins the headings below a page's title at 1.
