@@ -164,7 +164,7 @@ std::optional<double> frames_lost(const std::optional<Drive>& drive) {
   return drive ? std::optional(static_cast<double>(drive->run.summary.frames_lost)) : std::nullopt;
 }
 
-/// The first 12 poses of the reference are filled in (docs/design.md): the drive begins after them.
+/// The first 12 poses of the reference are filled in (docs/stereo_slam.md): the drive begins after them.
 void add_odometry_rows(Scoreboard& board, stereo_slam::Calibration calibrate) {
   const auto drive = run_drive("kitti_odometry_a", "kitti_odometry", calibrate);
   const std::string name = std::string("kitti_odometry_a from frame 12") +

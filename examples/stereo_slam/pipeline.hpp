@@ -71,7 +71,7 @@ struct PipelineOptions {
   /// How far a rig may be off, where it is estimated with the map. The length stands for all that makes the
   /// world larger or smaller: no image shows it, and it only widens the covariance. Focal lengths and
   /// principal points are left as they are given: freed, they take up what lenses do besides
-  /// (docs/design.md).
+  /// (docs/stereo_slam.md).
   cairn::RigSigmas rig = {.rotation = 5e-4, .direction = 5e-4, .length = 3e-3};
   cairn::CalibrationDriftOptions calibration = {
       .initial_sigma = 2e-4, .walk_rotation = 1e-5, .walk_baseline = 1e-6};
