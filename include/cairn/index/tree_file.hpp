@@ -6,9 +6,11 @@
 ///
 ///   bytes 0-7    "cairnkd" and a zero
 ///   8-11         version of the format: 1           all numbers little-endian
-///   12-15        bytes a coordinate (1, 2, 4 or 8); 256 more for whole numbers from 0 on, 512 more for
-///   others 16-23        dimension 24-31        points 32-39        FNV-1a checksum (64 bits) of bytes 8-31
-///   and of all from 40 on 40-          ids (4 bytes each), then coordinates, point by point in leaf order
+///   12-15        bytes a coordinate (1, 2, 4 or 8); 256 more for whole numbers from 0 on, 512 for others
+///   16-23        dimension
+///   24-31        points
+///   32-39        FNV-1a checksum (64 bits) of bytes 8-31 and of all from 40 on
+///   40-          ids (4 bytes each), then coordinates, point by point in leaf order
 ///
 /// Loading checks the sum, every coordinate and every id and splits the points anew, so that no file, damaged
 /// or made up, makes a damaged tree; that costs a build (about 0.1 us a point in three dimensions).
