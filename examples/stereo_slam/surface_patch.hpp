@@ -29,7 +29,7 @@ namespace stereo_slam {
 /// A piece of an image and of the plane that it shows. Its place is wherever between pixels a landmark was
 /// found: looked at from the same distance, patches around whole pixels would all lie at one part of a pixel,
 /// and what linear interpolation does wrong there would turn the camera instead of averaging out
-/// (docs/design.md).
+/// (docs/stereo_slam.md).
 struct SurfacePatch {
   static constexpr int half = 5;             ///< it reaches so far to every side of its centre [pixels]
   static constexpr int side = 2 * half + 4;  ///< of what is kept: slopes and the part of a pixel need more
