@@ -508,7 +508,7 @@ void Pipeline::make_keyframe(const Located& located, const StereoFrame& frame, F
 void Pipeline::add_landmarks(const std::vector<Match>& known, const StereoFrame& frame) {
   // A patch says where its landmark is to a twentieth of a pixel, and lenses that are wrong by more do not
   // let it: on a recorded drive that nothing was chosen on, patches doubled the error. Of a rig that comes
-  // loose they make less of an error, and nine times more than the covariance says.
+  // loose they make a smaller error whose NEES is nine times as large.
   const bool with_patches =
       options_.patches && !map_.rig_correction() && options_.calibrate != Calibration::drifting;
   std::vector<std::uint8_t> taken(locals_.size(), 0);
