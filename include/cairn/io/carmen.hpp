@@ -23,6 +23,8 @@
 #include <cmath>
 #include <cstddef>
 #include <filesystem>
+#include <iterator>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <string>
@@ -256,15 +258,16 @@ inline void place_by_odometry(CarmenLog& log, const std::string& name) {
             ": expected scans with odometry, found scans that all carry the same pose and no ODOM line");
     return;
   }
-  std::vector<StampedOdometry> odometry = log.odometry;  // whose times may run back
-  std::ranges::stable_sort(odometry, {}, &StampedOdometry::time);
+  std::multimap<double, SE2> by_time;  // the log's times may run back; what shares one stays in its order
+  for (const StampedOdometry& each : log.odometry)
+    by_time.emplace_hint(by_time.end(), each.time, each.T_odom_robot);
   for (StampedScan& scan : log.scans) {
-    const auto after = std::ranges::upper_bound(odometry, scan.time, {}, &StampedOdometry::time);
-    SE2 pose = after == odometry.begin() ? odometry.front().T_odom_robot : std::prev(after)->T_odom_robot;
-    if (after != odometry.begin() && after != odometry.end()) {
-      const double gap = after->time - std::prev(after)->time;
-      const double share = gap > 0 ? std::clamp((scan.time - std::prev(after)->time) / gap, 0.0, 1.0) : 0.0;
-      pose = retract(pose, Tangent<SE2>(share * local(pose, after->T_odom_robot)));
+    const auto after = by_time.upper_bound(scan.time);
+    const auto before = after == by_time.begin() ? after : std::prev(after);
+    SE2 pose = before->second;
+    if (after != before && after != by_time.end()) {
+      const double share = std::clamp((scan.time - before->first) / (after->first - before->first), 0.0, 1.0);
+      pose = retract(pose, Tangent<SE2>(share * local(pose, after->second)));
     }
     scan.T_odom_laser = pose * (scan.T_odom_robot.inverse() * scan.T_odom_laser);
     scan.T_odom_robot = pose;
