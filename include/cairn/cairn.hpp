@@ -16,6 +16,7 @@
 #include <cairn/core/parallel.hpp>
 #include <cairn/core/random.hpp>
 #include <cairn/core/reset_on_move.hpp>
+#include <cairn/core/shared_array.hpp>
 #include <cairn/core/sizes.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/core/symmetric_eigen.hpp>
@@ -115,7 +116,6 @@
 #include <cairn/index/points.hpp>
 #include <cairn/index/principal_axes.hpp>
 #include <cairn/index/ratio_test.hpp>
-#include <cairn/index/shared_array.hpp>
 #include <cairn/index/shared_kd_tree.hpp>
 #include <cairn/index/tree_file.hpp>
 #include <cairn/io/binary_file.hpp>

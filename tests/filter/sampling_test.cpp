@@ -186,6 +186,86 @@ TEST_SUITE("particle") {
     CHECK(std::abs(x - joint.mean(0)) < 0.03);
     CHECK(std::abs(l - joint.mean(1)) < 0.03);
   }
+
+  using OnALine = cairn::ConditionalParticles<Vector<1>, Vector<1>>;
+  OnALine on_a_line(int particles, int landmarks, cairn::Random& random) {
+    std::vector<cairn::ConditionalParticle<Vector<1>, Vector<1>>> states;
+    for (int i = 0; i < particles; ++i) {
+      states.push_back({cairn::sample(Gaussian<Vector<1>>{Vector<1>(0.0), Matrix<1>(1.0)}, random), {}});
+      for (int l = 0; l < landmarks; ++l) states.back().parts.push_back({Vector<1>(5.0 + l), Matrix<1>(0.5)});
+    }
+    return OnALine::equal(std::move(states));
+  }
+
+  TEST_CASE("rao-blackwell: what is seen at one moment counts together, a part that is seen twice too") {
+    cairn::Random random(cairn_test::seed());
+    OnALine belief = on_a_line(20000, 3, random);
+    const std::vector<cairn::PartSighting<Vector<1>>> seen = {
+        {2, Vector<1>(7.4)}, {0, Vector<1>(5.9)}, {2, Vector<1>(7.7)}};
+    REQUIRE(cairn::RaoBlackwell{}.update(belief, Relative{}, std::span(seen), random).accepted());
+    Gaussian<Vector<4>> joint{Vector<4>(0, 5, 6, 7), Vector<4>(1, 0.5, 0.5, 0.5).asDiagonal()};
+    for (const auto& [part, z] : seen) {
+      Matrix<1, 4> h(-1, 0, 0, 0);
+      h(0, static_cast<Eigen::Index>(part) + 1) = 1;
+      REQUIRE(cairn::Kalman{}.update(joint, cairn::LinearSensor<1, 4>{h, Matrix<1>(0.1)}, z).accepted());
+    }
+    const auto w = belief.weights();
+    Vector<4> mean = Vector<4>::Zero();
+    for (std::size_t i = 0; i < belief.size(); ++i) {
+      mean(0) += w[i] * belief.states[i].state(0);
+      for (std::size_t l = 0; l < 3; ++l)
+        mean(static_cast<Eigen::Index>(l) + 1) += w[i] * belief.states[i].parts[l].mean(0);
+    }
+    CHECK((mean - joint.mean).cwiseAbs().maxCoeff() < 0.04);
+    // The weights are resampled once, for all of them: a resampled belief has equal ones.
+    OnALine weighed = on_a_line(100, 3, random), one_by_one = weighed;
+    const cairn::RaoBlackwell never{.particles = {.resample_below = 0}};
+    REQUIRE(never.update(weighed, Relative{}, std::span(seen), random).accepted());
+    for (const auto& [part, z] : seen)
+      REQUIRE(never.update(one_by_one, part, Relative{}, z, random).accepted());
+    for (std::size_t i = 0; i < weighed.size(); ++i) {
+      CHECK(weighed.log_weights[i] == doctest::Approx(one_by_one.log_weights[i]).epsilon(1e-12));
+      CHECK(weighed.states[i].parts[2].mean == one_by_one.states[i].parts[2].mean);
+    }
+  }
+
+  TEST_CASE("rao-blackwell: a sighting costs as many copies as the array of parts is deep, however many") {
+    cairn::Random random(5);
+    for (const int landmarks : {16, 256, 4096}) {
+      OnALine belief = on_a_line(10, landmarks, random);
+      const OnALine before = belief;
+      const cairn::RaoBlackwell filter{.particles = {.resample_below = 0}};
+      REQUIRE(filter.update(belief, 11, Relative{}, Vector<1>(16.0), random).accepted());
+      const double levels = std::max(1.0, std::ceil(std::log2(landmarks) / 4));
+      for (std::size_t i = 0; i < belief.size(); ++i) {
+        const auto copies = belief.states[i].parts.node_copies() - before.states[i].parts.node_copies();
+        CHECK(static_cast<double>(copies) <= levels + 1);
+        CHECK(before.states[i].parts[11].mean(0) == 16.0);
+        CHECK(&belief.states[i].parts[0] != &before.states[i].parts[0]);  // of the leaf that was written
+        if (landmarks > 16) CHECK(&belief.states[i].parts[40] == &before.states[i].parts[40]);
+      }
+    }
+  }
+
+  TEST_CASE("rao-blackwell: what is refused changes nothing and says why") {
+    cairn::Random random(6);
+    OnALine belief = on_a_line(10, 2, random);
+    const OnALine before = belief;
+    using Seen = std::vector<cairn::PartSighting<Vector<1>>>;
+    const auto update = [&](const Seen& seen) {
+      return cairn::RaoBlackwell{}.update(belief, Relative{}, std::span(seen), random).status;
+    };
+    CHECK(update({{0, Vector<1>(5.0)}, {2, Vector<1>(5.0)}}) == Status::size_mismatch);
+    CHECK(update({{0, Vector<1>(5.0)}, {1, Vector<1>(std::nan(""))}}) == Status::not_finite);
+    for (std::size_t i = 0; i < belief.size(); ++i) {
+      CHECK(belief.log_weights[i] == before.log_weights[i]);
+      CHECK(&belief.states[i].parts[0] == &before.states[i].parts[0]);
+    }
+    CHECK(update({}) == Status::accepted);
+    belief.states.clear();
+    belief.log_weights.clear();
+    CHECK(update({{0, Vector<1>(5.0)}}) == Status::depleted);
+  }
 }
 
 TEST_SUITE("interacting") {

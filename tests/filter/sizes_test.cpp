@@ -273,7 +273,9 @@ bool same(const cairn::Ensemble<X>& a, const cairn::Ensemble<X>& b) {
 }
 template <class X>
 bool same(const cairn::ConditionalParticle<X, X>& a, const cairn::ConditionalParticle<X, X>& b) {
-  return same(a.state, b.state) && same(a.parts, b.parts);
+  bool parts = a.parts.size() == b.parts.size();
+  for (std::size_t i = 0; parts && i < a.parts.size(); ++i) parts = same(a.parts[i], b.parts[i]);
+  return parts && same(a.state, b.state);
 }
 template <class X>
 bool same(const cairn::Particles<X>& a, const cairn::Particles<X>& b) {

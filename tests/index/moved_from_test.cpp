@@ -23,7 +23,7 @@
 #include <cairn/index/multi_tree_file.hpp>
 #include <cairn/index/nearest_first.hpp>
 #include <cairn/index/packed_points.hpp>
-#include <cairn/index/shared_array.hpp>
+#include <cairn/core/shared_array.hpp>
 #include <cairn/index/shared_kd_tree.hpp>
 #include <cairn/index/tree_file.hpp>
 

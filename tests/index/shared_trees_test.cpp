@@ -11,7 +11,7 @@
 
 #include <doctest/doctest.h>
 
-#include <cairn/index/shared_array.hpp>
+#include <cairn/core/shared_array.hpp>
 #include <cairn/index/shared_kd_tree.hpp>
 
 #include "support/random.hpp"

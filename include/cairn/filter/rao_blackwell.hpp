@@ -3,8 +3,10 @@
 //
 /// @file
 /// The Rao-Blackwellised particle filter: particles over the hard part of the state, each carrying Gaussians
-/// over the parts that are easy once the hard part is known. With a pose as the hard part and landmarks as
-/// the easy parts this is FastSLAM (M. Montemerlo et al., AAAI 2002).
+/// over the parts that are easy once the hard part is known. With a pose as the hard part and landmarks whose
+/// identities are known as the easy parts this is FastSLAM 1.0 (M. Montemerlo et al., AAAI 2002). What wants
+/// more is a ConditionalMap of ConditionalFilter (conditional.hpp): paths, proposals that look at the
+/// measurement, maps of any kind; LandmarkMap (slam/landmark_map.hpp) chooses identities in each particle.
 ///
 /// ```cpp
 /// struct Sighting {
@@ -20,10 +22,13 @@
 #include <concepts>
 #include <cstddef>
 #include <limits>
+#include <span>
+#include <utility>
 #include <vector>
 
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/random.hpp>
+#include <cairn/core/shared_array.hpp>
 #include <cairn/filter/detail/agreement.hpp>
 #include <cairn/filter/detail/plain_model.hpp>
 #include <cairn/filter/extended.hpp>
@@ -45,15 +50,23 @@ concept ConditionalMeasurement =
       { h.noise(x, part) } -> detail::CovarianceLike<typename H::Measurement>;
     };
 
-/// A sampled state and what is believed of each part if that sample is the truth.
+/// A sampled state and what is believed of each part if that sample is the truth. Copies of a particle share
+/// the parts that none of them has changed: a particle is copied in O(1), `parts.write(i)` in O(log n).
 template <Manifold X, Manifold Part>
 struct ConditionalParticle {
   X state;
-  std::vector<Gaussian<Part>> parts;
+  SharedArray<Gaussian<Part>> parts;
 };
 
 template <Manifold X, Manifold Part>
 using ConditionalParticles = Particles<ConditionalParticle<X, Part>>;
+
+/// Part number `part` was seen as z.
+template <std::copyable Z>
+struct PartSighting {
+  std::size_t part = 0;
+  Z z;
+};
 
 namespace detail {
 
@@ -91,35 +104,56 @@ struct RaoBlackwell {
     return status;
   }
 
-  /// Part number `index` was seen as z: updates that part in every particle and weighs the particles by the
-  /// likelihood of z. A particle in which the update is refused gets the likelihood of the gate's edge where
-  /// it was gated, and none otherwise. Refused as a whole where an index is missing or no weight is left.
+  /// What was seen at one moment, one sighting after the other: updates those parts in every particle, weighs
+  /// the particles by the likelihood of all sightings together, and resamples at most once. A sighting that
+  /// is gated in a particle changes nothing there and has the likelihood of the gate's edge; one that is
+  /// refused otherwise leaves that particle none. Refused as a whole, and nothing changed, where there is no
+  /// such part, a size does not fit, or no weight is left, for the reason of the last particle that has one.
+  /// O(particles x sightings x log parts).
+  template <class H>
+    requires(ConditionalMeasurement<H> || detail::explain_sizes<H>)
+  UpdateResult update(ConditionalParticles<typename H::State, typename H::Part>& belief, const H& sensor,
+                      std::span<const PartSighting<typename H::Measurement>> seen, Random& random) const {
+    if (belief.states.empty()) return Status::depleted;
+    ConditionalParticles<typename H::State, typename H::Part> next = belief;
+    std::vector<double> log_likelihoods(belief.size(), 0.0);
+    Status refused = Status::depleted;
+    for (std::size_t i = 0; i < next.size(); ++i) {
+      auto& [state, own] = next.states[i];
+      for (const auto& [part, z] : seen) {
+        if (part >= own.size()) return Status::size_mismatch;
+        Gaussian<typename H::Part> updated = own[part];
+        const auto in = parts.update(updated, detail::HeldSensor<H>{sensor, state}, z);
+        if (in.status == Status::size_mismatch) return in.status;
+        log_likelihoods[i] += log_likelihood(in);
+        if (in.accepted())
+          own.write(part) = std::move(updated);
+        else if (in.status != Status::gated)
+          refused = in.status;
+      }
+    }
+    const UpdateResult result = particles.update_with(next, log_likelihoods, random);
+    if (result.accepted()) belief = std::move(next);
+    return result.status == Status::depleted ? UpdateResult(refused) : result;
+  }
+
+  /// The same where one part was seen.
   template <class H, class V = typename H::Measurement>
     requires(ConditionalMeasurement<H> || detail::explain_sizes<H>)
-  UpdateResult update(ConditionalParticles<typename H::State, typename H::Part>& belief, std::size_t index,
+  UpdateResult update(ConditionalParticles<typename H::State, typename H::Part>& belief, std::size_t part,
                       const H& sensor, const V& z, Random& random) const {
-    if (belief.states.empty()) return Status::depleted;
     const detail::Given<typename H::Measurement, V> given(z);
-    if (given.misfit()) return Status::size_mismatch;
-    std::vector<double> log_likelihoods(belief.size());
-    std::vector<Gaussian<typename H::Part>> next;
-    next.reserve(belief.size());
-    for (std::size_t i = 0; i < belief.size(); ++i) {
-      const auto& particle = belief.states[i];
-      if (index >= particle.parts.size()) return Status::size_mismatch;
-      next.push_back(particle.parts[index]);
-      auto in = parts.update(next.back(), detail::HeldSensor<H>{sensor, particle.state}, given.value());
-      if (in.status == Status::size_mismatch) return in.status;
-      if (in.status == Status::gated) in.nis = static_cast<decltype(in.nis)>(parts.gate);
-      const bool usable = in.accepted() || in.status == Status::gated;
-      log_likelihoods[i] =
-          usable ? static_cast<double>(in.log_likelihood()) : -std::numeric_limits<double>::infinity();
-    }
-    const std::vector<ConditionalParticle<typename H::State, typename H::Part>> before = belief.states;
-    for (std::size_t i = 0; i < belief.size(); ++i) belief.states[i].parts[index] = next[i];
-    const Status status = particles.update_with(belief, log_likelihoods, random);
-    if (status != Status::accepted) belief.states = before;
-    return status;
+    if (!belief.states.empty() && given.misfit()) return Status::size_mismatch;
+    const PartSighting<typename H::Measurement> sighting{part, given.value()};
+    return update(belief, sensor, std::span(&sighting, 1), random);
+  }
+
+private:
+  template <int M, class S>
+  [[nodiscard]] double log_likelihood(Innovation<M, S> in) const {
+    if (in.status == Status::gated) in.nis = static_cast<S>(parts.gate);
+    return in.accepted() || in.status == Status::gated ? static_cast<double>(in.log_likelihood())
+                                                       : -std::numeric_limits<double>::infinity();
   }
 };
 

@@ -63,7 +63,7 @@
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/rao_blackwell.hpp>
 #include <cairn/filter/status.hpp>
-#include <cairn/index/shared_array.hpp>
+#include <cairn/core/shared_array.hpp>
 #include <cairn/index/shared_kd_tree.hpp>
 #include <cairn/manifold/manifold.hpp>
 #include <cairn/version.hpp>

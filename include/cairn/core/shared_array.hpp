@@ -13,6 +13,8 @@
 
 #include <array>
 #include <cstddef>
+#include <initializer_list>
+#include <utility>
 
 #include <cairn/core/counted.hpp>
 #include <cairn/core/reset_on_move.hpp>
@@ -23,6 +25,11 @@ namespace cairn { inline namespace CAIRN_ABI {
 template <class T>
 class SharedArray {
 public:
+  SharedArray() = default;
+  SharedArray(std::initializer_list<T> elements) {
+    for (const T& element : elements) push_back(element);
+  }
+
   /// One beyond the highest index that was written.
   [[nodiscard]] std::size_t size() const noexcept { return size_; }
 
@@ -46,6 +53,9 @@ public:
     for (int level = height_; level > 1; --level) at = &own(at->branches[digit(i, level)]);
     return own(at->leaves[digit(i, 1)])[digit(i, 0)];
   }
+
+  /// Writes behind the last.
+  void push_back(T element) { write(size_) = std::move(element); }
 
   /// Nodes that writes to this array have copied since it was made or copied from one that had none: what
   /// sharing costs.
