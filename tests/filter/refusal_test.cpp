@@ -5,6 +5,7 @@
 // are none, contradictions, scales of many decades. The oracles are closed forms, long double and 113 bits.
 #include <array>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <tuple>
 #include <vector>
@@ -17,6 +18,8 @@
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/information.hpp>
 #include <cairn/filter/interacting.hpp>
+#include <cairn/filter/joint_extended.hpp>
+#include <cairn/filter/joint_gaussian.hpp>
 #include <cairn/filter/kalman.hpp>
 #include <cairn/filter/kalman_bucy.hpp>
 #include <cairn/filter/particle.hpp>
@@ -34,6 +37,7 @@
 #include <cairn/models/motion.hpp>
 #include <cairn/models/sensor.hpp>
 
+#include "filter/every_form.hpp"
 #include "filter/exact_filter.hpp"
 #include "support/random.hpp"
 
@@ -536,6 +540,60 @@ TEST_SUITE("refusals") {
     REQUIRE(run.measure(sensor, Vector<2>(2.0, 1.0), 2.5).accepted());
     CHECK(run.measure(sensor, Vector<2>(1.0, 0.0), 1.25).status == Status::too_old);
     CHECK(run.measure(sensor, Vector<2>(1.0, 0.0), 1.75).accepted());
+  }
+
+  // A turn by 1e155 radians has a square that no double holds.
+  struct FarTurn {
+    using State = cairn::SO3;
+    using Measurement = Vector<3>;
+    [[nodiscard]] Vector<3> predict(const State&) const { return Vector<3>::Zero(); }
+    [[nodiscard]] Matrix<3> jacobian(const State&) const { return Matrix<3>::Identity(); }
+    [[nodiscard]] Matrix<3> noise(const State&) const { return Matrix<3>::Identity(); }
+  };
+  TEST_CASE("filters: a step that leaves what numbers hold is refused, and the belief is left") {
+    const Gaussian<cairn::SO3> prior{cairn::SO3::exp(Vector<3>(0.1, 0.2, 0.3)),
+                                     1e306 * Matrix<3>::Identity()};
+    const Vector<3> z(1e155, -2e155, 1.5e155);
+    const auto refuses = [&](const char* name, const auto& filter) {
+      CAPTURE(name);
+      auto belief = cairn_test::begin_with(filter, prior);
+      const auto before = belief;
+      CHECK_FALSE(filter.update(belief, FarTurn{}, z).accepted());
+      CHECK(std::memcmp(&belief, &before, sizeof(belief)) == 0);
+    };
+    refuses("Extended", cairn::Extended{});
+    refuses("SquareRoot", cairn::SquareRoot{});
+    refuses("UDFilter", cairn::UDFilter{});
+    auto information = *cairn::InformationBelief<cairn::SO3>::from(prior);
+    CHECK(cairn::InformationFilter{}.update(information, FarTurn{}, z).accepted());  // no step is made yet
+    CHECK_FALSE(information.gaussian());
+    CHECK_FALSE(cairn::InformationFilter::recentre(information));
+    cairn::JointGaussian<cairn::SO3> joint;
+    const auto turned = joint.add(prior).id;
+    for (const cairn::JointExtended filter : {cairn::JointExtended{}, {.iterations = 3}}) {
+      CHECK_FALSE(filter.update(joint, FarTurn{}, z, turned).accepted());
+      CHECK(joint.mean(turned).matrix() == prior.mean.matrix());
+      CHECK(joint.covariance() == prior.covariance);
+    }
+    // Of two numbers the second moves 1e153 times as far as the first, from 1.79e308.
+    const Gaussian<Vector<2>> far{Vector<2>(0, 1.79e308), (Matrix<2>() << 1, 1e153, 1e153, 2e306).finished()};
+    const cairn::LinearSensor<1, 2> first{Matrix<1, 2>(1, 0), Matrix<1>(0.01)};
+    const auto refuses_far = [&](const char* name, const auto& filter) {
+      CAPTURE(name);
+      auto belief = cairn_test::begin_with(filter, far);
+      const auto before = belief;
+      CHECK(filter.update(belief, first, Vector<1>(2e153)).status == Status::not_finite);
+      CHECK(std::memcmp(&belief, &before, sizeof(belief)) == 0);
+    };
+    refuses_far("Kalman", cairn::Kalman{});
+    refuses_far("Extended", cairn::Extended{});
+    refuses_far("SquareRoot", cairn::SquareRoot{});
+    refuses_far("UDFilter", cairn::UDFilter{});
+    cairn::JointGaussian<Vector<2>> blocks;
+    const auto id = blocks.add(far).id;
+    CHECK_FALSE(cairn::JointExtended{}.update(blocks, first, Vector<1>(2e153), id).accepted());
+    CHECK(blocks.mean(id) == far.mean);
+    CHECK(blocks.covariance() == far.covariance);
   }
 
   TEST_CASE("so3, se2: quaternions of any length, and small turns in float") {

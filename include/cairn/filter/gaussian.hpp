@@ -86,6 +86,16 @@ template <Manifold X>
     return all_finite(manifold_traits<X>::local(x, x));
 }
 
+/// x moved by d, unless that leaves what numbers can hold: false then, and x as it was.
+template <Manifold X>
+[[nodiscard]] inline bool move_by(X& x, const Tangent<X>& d) {
+  const X moved = manifold_traits<X>::retract(x, d);
+  if (!finite_state(moved)) [[unlikely]]
+    return false;
+  x = moved;
+  return true;
+}
+
 /// d^T a^-1 d, of the pseudo-inverse, for a singular a; infinity where d leaves the directions in which a has
 /// variance by more than the deviation that rounding of a may have hidden, or a is no covariance.
 template <int N, class S>

@@ -347,7 +347,7 @@ struct InformationFilter {
     CovarianceOf<X> inverse = belief.information;
     Tangent<X> d = belief.vector;
     if (!belief.solve(inverse, d) || !all_finite(d)) return false;
-    belief.point = retract(belief.point, d);
+    if (!detail::move_by(belief.point, d)) return false;
     belief.vector.setZero();
     return true;
   }

@@ -90,8 +90,10 @@ template <Manifold X, int M, class Array>
       !determined<dof<X>, M, S>(update, belief.root, h, r, KeptAs::root, digits))
     in.status = Status::not_positive_definite;
   if (in.status != Status::accepted) return in;
-  belief.mean = retract(belief.mean, Tangent<X>(update.step));
-  belief.root = update.root;
+  if (move_by(belief.mean, Tangent<X>(update.step)))
+    belief.root = update.root;
+  else
+    in.status = Status::not_finite;
   return in;
 }
 

@@ -179,7 +179,7 @@ struct SquareRootInformationFilter {
     CovarianceOf<X> inverse = belief.root;
     Tangent<X> d = belief.vector;
     if (!belief.solve(inverse, d) || !all_finite(d)) return false;
-    belief.point = retract(belief.point, d);
+    if (!detail::move_by(belief.point, d)) return false;
     belief.vector.setZero();
     return true;
   }

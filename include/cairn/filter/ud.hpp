@@ -138,8 +138,10 @@ struct UDFilter {
     if (in.status == Status::accepted) [[likely]] {
       Tangent<X> moved;
       step.store(moved.data());
-      belief.mean = retract(belief.mean, moved);
-      keep(belief, u, d);
+      if (detail::move_by(belief.mean, moved)) [[likely]]
+        keep(belief, u, d);
+      else
+        in.status = Status::not_finite;
     }
     return in;
   }

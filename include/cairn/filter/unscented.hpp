@@ -64,8 +64,10 @@ template <Manifold X, int M, class S, class Again>
   }
   Tangent<X> step;
   out.step_to(step);
-  belief.mean = retract(belief.mean, step);
-  out.covariance_to(belief.covariance);
+  if (move_by(belief.mean, step)) [[likely]]
+    out.covariance_to(belief.covariance);
+  else
+    in.status = Status::not_finite;
 }
 
 /// The same from matrices.
@@ -104,8 +106,10 @@ void correct_by_moments(Gaussian<X>& belief, const Matrix<dof<X>, M, S>& cross, 
     in = out.innovation;
     if (in.status != Status::accepted) return;
   }
-  belief.mean = retract(belief.mean, Tangent<X>(out.step));
-  belief.covariance = out.covariance;
+  if (move_by(belief.mean, Tangent<X>(out.step)))
+    belief.covariance = out.covariance;
+  else
+    in.status = Status::not_finite;
 }
 
 }  // namespace detail

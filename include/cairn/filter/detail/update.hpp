@@ -268,13 +268,13 @@ template <Manifold X, int M, class H>
     correct_into<n, M, S>(candidate, belief.covariance, dense_of(h), r, gate, form);
   else
     correct_into<n, M, S>(candidate, belief.covariance, h, r, gate, form);
-  if (!finite_state(belief.mean)) [[unlikely]]
-    if (candidate.innovation.status == Status::accepted) candidate.innovation.status = Status::not_finite;
   if (candidate.innovation.status == Status::accepted) [[likely]] {
     Tangent<X> step;
     candidate.step_to(step);
-    belief.mean = manifold_traits<X>::retract(belief.mean, step);
-    candidate.covariance_to(belief.covariance);
+    if (move_by(belief.mean, step)) [[likely]]
+      candidate.covariance_to(belief.covariance);
+    else
+      candidate.innovation.status = Status::not_finite;
   }
   return candidate.innovation;
 }
