@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <limits>
 #include <sstream>
 #include <string>
@@ -172,6 +174,24 @@ TEST_SUITE("tree_file") {
           "a.tree: coordinates of 1 bytes (whole numbers from 0 on), expected 1 bytes (whole numbers)");
     CHECK(refusal<cairn::KdTree<std::uint32_t, 3>>(naturals).empty());
     CHECK(refusal<cairn::KdTree<std::int32_t, 3>>(wholes).empty());
+  }
+
+  // Else it meets nothing but the refusals at the beginning of a file.
+  TEST_CASE("tree_file: the fuzz target begins with trees that are read") {
+    const auto corpus = std::filesystem::path(__FILE__).parent_path().parent_path() / "fuzz/corpus/tree_file";
+    const auto refused = [&]<class T>(const char* name, T) {
+      std::ifstream in(corpus / name, std::ios::binary);
+      in.get();  // which kind of tree
+      std::ostringstream bytes;
+      bytes << in.rdbuf();
+      return refusal<T>(signed_anew(bytes.str()));
+    };
+    CHECK(refused("floats_of_3", cairn::KdTree<float, 3>()) == "");
+    CHECK(refused("floats", cairn::KdTree<float>()) == "");
+    CHECK(refused("doubles", cairn::KdTree<double>()) == "");
+    CHECK(refused("bytes", cairn::KdTree<std::uint8_t>()) == "");
+    CHECK(refused("shorts", cairn::KdTree<std::int16_t>()) == "");
+    CHECK(refused("integers_of_2", cairn::KdTree<std::int32_t, 2>()) == "");
   }
 
   TEST_CASE("tree_file: what is foreign is refused by what it is") {
