@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <span>
 #include <string>
 #include <vector>
@@ -81,6 +83,21 @@ std::vector<SE3> go_on(KeyframeMap& map, std::span<const ArenaFrame> frames, con
 }  // namespace
 
 TEST_SUITE("keyframe_map_file") {
+  // Else it meets nothing but the refusals at the beginning of a map.
+  TEST_CASE("keyframe_map_file: the fuzz target begins with maps that are read") {
+    const auto corpus =
+        std::filesystem::path(__FILE__).parent_path().parent_path() / "fuzz/corpus/keyframe_map";
+    for (const char* name : {"plain_1", "plain_10", "rig_1", "rig_10"}) {
+      CAPTURE(name);
+      std::ifstream in(corpus / name, std::ios::binary);
+      BinaryWriter out;
+      for (char c = 0; in.get(c);) out.put(c);
+      const KeyframeMap map = map_of(out.file("testing ", 1));
+      CHECK(map.landmark_count() >= 8);
+      CHECK(map.rig_correction().has_value() == (name[0] == 'r'));
+    }
+  }
+
   TEST_CASE("keyframe_map_file: what is loaded is the map that was saved, and goes on as it would have") {
     for (const double rig_sigma : {0.0, 5e-4}) {
       CAPTURE(rig_sigma);
