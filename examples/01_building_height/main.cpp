@@ -8,7 +8,7 @@
 // ones.
 //
 //   x   height of the building, as believed       [m]      z   one reading of the altimeter           [m]
-//   p   variance of that belief                   [m^2]    r   variance of a reading's error, 5 m     [m^2]
+//   p   variance of that belief                   [m^2]    r   variance of a reading's error, (5 m)^2 [m^2]
 //   k   gain, the share of the surprise taken over [1]     n   number of readings so far              [1]
 //
 // EQUATIONS
@@ -22,13 +22,13 @@
 // https://www.kalmanfilter.net/kalman1d.html: guess 60 m, 15 m off or so; the end is 49.57 m with a variance
 // of 2.47 m^2.
 //
-// LOOK AT  the blue funnel: it closes fast at first, then slowly, and the black line leaves it about one time
-// in twenty. The gain falls like 1/n. The last plot holds the filter against a thousand other buildings.
+// LOOK AT  the blue funnel: it closes fast at first, then slowly. The black line should lie outside one time
+// in twenty; here it never does. The gain falls like 1/n. The last plot tries a thousand other buildings.
 //
 // CHANGE THIS, one at a time (answers at the end of the file). The two published figures then turn red.
 //   1. guess_variance = 1: you are sure of your wrong guess. Where does the estimate end?
 //   2. guess_variance = 1e9: you know nothing. Which other curve of the first plots does the filter become?
-//   3. Append 500 to `readings`, a bird in the beam. What would have to notice?
+//   3. Append 500 to `readings`, a bird in the beam. What would have had to notice?
 #include <cmath>
 #include <cstddef>
 #include <numbers>
@@ -68,7 +68,7 @@ int main(int argc, char** argv) {
     const Belief before = belief;
     const auto innovation = cairn::Kalman{}.update(belief, altimeter, Height(z));
     if (lesson.mistake("variance-stays")) belief.covariance = before.covariance;
-    return before.covariance(0, 0) / innovation.covariance(0, 0);  // the gain
+    return before.covariance(0, 0) / innovation.covariance(0, 0);  // the gain, p / (p + r)
   };
 
   // Ten readings of a building that is 50 m high.
@@ -83,7 +83,7 @@ int main(int argc, char** argv) {
     mean += (z - mean) / n;
     table.push_back({n, z, mean, 1 / n, k, x, x - 2 * deviation, x + 2 * deviation, 50});
   }
-  lesson.say("ten readings, guess 60 m: " + example::readable(belief.mean(0), 4) + " m; their mean " +
+  lesson.say("guess 60 m, then the readings: " + example::readable(belief.mean(0), 4) + " m; their mean " +
              example::readable(mean, 4) + " m; the truth 50 m");
 
   // Is the variance true? As many buildings as --steps says, as far from the guess as it promises.
@@ -114,7 +114,7 @@ int main(int argc, char** argv) {
       .title = "The estimate after each reading",
       .caption =
           "Readings (dots) scatter to the end as they did at first, but move the filter less and less. Its "
-          "funnel holds the truth; the guess of 60 m is forgotten with the first reading.",
+          "funnel holds the truth; the guess of 60 m is all but forgotten with the first reading.",
       .x = {"readings"},
       .y = {"height", "m"},
       .x_values = column(table, 0),
@@ -147,4 +147,4 @@ int main(int argc, char** argv) {
 // ANSWERS  1. At 57 m: the readings together have a variance of 25 / 10, the guess of 1; so the guess moves
 // by 1 / (1 + 2.5) of the 10.5 m to their mean.
 // 2. The recursive mean: k = p / (p + r) is 1 at first and then 1/n, since p becomes r / n.
-// 3. The innovation: 450 m of surprise where sqrt(p + r) is 5 m. A gate on it is Kalman{.gate = ...}.
+// 3. The innovation: 450 m where sqrt(p + r) is 5 m. Kalman{.gate = 16} in take_in refuses 4 sigma: green.
