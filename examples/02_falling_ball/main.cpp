@@ -3,12 +3,12 @@
 //
 // 02 Falling ball: how to choose Q.
 //
-// STORY  A ball is dropped from a balloon. A radar tells its height, 0.5 m off or so, at odd moments. Gusts
-// change the ball's acceleration, nobody knows how. How much of that a filter expects is its Q, which is
-// mostly tuned until a curve looks nice.
+// STORY  A ball is dropped from a balloon. A radar tells its height at odd moments, 0.5 m off or so
+// (sigma). Gusts change the ball's acceleration, nobody knows how. How much of that a filter expects is its
+// Q, which is mostly tuned until a curve looks nice.
 //
 //   x   height, velocity, acceleration   [m, m/s, m/s^2]    dt  time since the last reading            [s]
-//   P   covariance of the belief in x                       z   a reading of the height, h as believed [m]
+//   P   covariance of the belief in x                       z   a reading of the height; h = H x, expected
 //   q   density of the gusts' jerk       [(m/s^3)^2 s]      S   variance of z, as the filter expects [m^2]
 //   (jerk: how fast acceleration changes)                   K   gain: a share of the surprise for each of x
 // EQUATIONS (Bar-Shalom, Li, Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001)
@@ -99,7 +99,7 @@ int main(int argc, char** argv) {
   while (drops.size() < lesson.steps()) drops.push_back(simulate(random));
 
   example::PlaneFilm film{.title = "One drop, followed by filters of other q",
-                          .caption = "The truth should stay in the band of 2 sigma, and fill it.",
+                          .caption = "The truth should stay in the band, and fill it. Numbers: all drops.",
                           .x = {"time", "s"},
                           .y = {"truth less estimate", "m"},
                           .slider = {"q, times the true one:"},
@@ -131,7 +131,7 @@ int main(int argc, char** argv) {
   lesson.add(film);
   lesson.add(example::LinePlot{
       .title = "What the filter can tell, and what an eye can",
-      .caption = "NIS falls through 1 where q is right. The rms error needs the truth, in a flat valley.",
+      .caption = "NIS falls through 1 where q is right. The rms error is flat there, and needs the truth.",
       .x = {"q, times the true one"},
       .y = {"NIS; rms error", "1; m"},
       .x_values = column(sweep, 0),
@@ -144,7 +144,7 @@ int main(int argc, char** argv) {
   lesson.csv("sweep", {"q_factor", "nis", "nees", "rms_m", "expected_nis"}, sweep);
   return lesson.finish();
 }
-// ANSWERS  1. Near q = 0.07 of the true one, with a NEES of 22 there: one NIS cannot set both R and q. Look
+// ANSWERS  1. Near 0.065 of the true q, with a NEES of 22 there: one NIS cannot set both R and q. Look
 // at whether surprises follow one another, too: they are independent where both are right.
-// 2. 1 +- 0.28, and no: 1.8 q gives 1.00, 10 q still 0.93. 3. Top left 32 times (dt^5), bottom right twice,
-// between 16, 8 and 4 times.
+// 2. 1 +- 0.28, and no: 1.8 q gives 1.00, 10 q still 0.93; even q / 100 is no longer seen. 3. Top left 32
+// times (dt^5), bottom right twice, between 16, 8 and 4 times.
