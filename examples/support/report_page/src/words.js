@@ -5,7 +5,9 @@ const words = [
   ['ATE', /\bATE\b/, 'absolute trajectory error: how far the estimated positions are from the true ones after the alignment that is named'],
   ['Cramer-Rao bound', /Cram[eé]r-Rao/, 'the smallest error that any unbiased estimate can have on average'],
   ['dead reckoning', /dead reckoning/i, 'adding up what the motion is known of, with nothing seen'],
+  ['extended filter', /\bextended\b/i, 'takes motion and sensor as straight lines, or planes, near its estimate'],
   ['inliers', /\binliers?\b/i, 'points that lie where the estimated pose says, within their noise; the rest counts as wrongly matched'],
+  ['Jacobian', /\bJacobians?\b/, 'the matrix of derivatives: each number that comes out by each that goes in'],
   ['keyframes', /\bkeyframes?\b/i, 'pictures whose poses are kept and estimated together; the landmarks rest on them'],
   ['landmark', /\blandmarks?\b/i, 'a point (or line, or post) of the world that the map holds'],
   ['N_eff', /\bN_eff\b/, 'effective number of particles, 1 over the sum of their squared weights: how many carry the weight'],
@@ -20,7 +22,9 @@ const words = [
   ['rms', /\b(rms|RMSE?|rmse)\b/, 'root of the mean of the squares: the usual size of an error'],
   ['RPE', /\bRPE\b/, 'relative pose error: how wrong the motion over a stretch is'],
   ['sigma', /\bsigmas?\b/i, 'standard deviation: two errors of three are smaller, 95 of 100 smaller than twice as much'],
+  ['smoother', /\bsmoothers?\b/i, 'estimates every moment from all that was measured, before and after it'],
   ['SURF', /\bSURF\b/, 'a detector of spots in an image that gives each 64 numbers to know it again by'],
+  ['unscented filter', /\bunscented\b/i, 'sends a few points through motion or sensor and takes mean and covariance of what comes out'],
 ];
 
 /** A list of the words that stand in what the page shows; null where there are none. */
