@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -237,6 +239,25 @@ TEST_SUITE("product_codes") {
     std::vector<float> there(32), back(32);
     cell.blocks.estimates(0, 2, tables, scale, there.data());
     turned.estimates(0, 2, tables, scale, back.data());
+    const auto reversed = [](std::uint32_t bits) {
+      std::uint32_t result = 0;
+      for (unsigned i = 0; i < 16; ++i) result |= (bits >> i & 1U) << (15 - i);
+      return result;
+    };
+    // Verdicts also hang on what each code misses: some points are possible, by some limits.
+    std::size_t possible = 0;
+    for (float below = 1; below < 1e7F; below *= 1.25F) {
+      const float proven = 2 * std::sqrt(below);
+      std::array<detail::CodeVerdict, 2> of_there{}, of_back{};
+      cell.blocks.verdicts(0, 2, there.data(), {0.5F * proven, proven, 0, below}, of_there.data());
+      turned.verdicts(0, 2, back.data(), {0.5F * proven, proven, 0, below}, of_back.data());
+      for (std::size_t block = 0; block < 2; ++block) {
+        CHECK(of_there[block].possible == reversed(of_back[1 - block].possible));
+        CHECK(of_there[block].likely == reversed(of_back[1 - block].likely));
+        possible += static_cast<std::size_t>(std::popcount(unsigned{of_there[block].possible}));
+      }
+    }
+    CHECK(possible > 0);
     std::reverse(back.begin(), back.end());
     CHECK(there == back);
   }
