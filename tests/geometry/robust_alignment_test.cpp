@@ -110,6 +110,55 @@ TEST_SUITE("robust_alignment") {
     CHECK(a.inliers[0] == 0);
   }
 
+  // The points themselves leave a turn about the line, or all turns, open; their noise does not know it.
+  TEST_CASE("align_robustly: noise beside a line, or about a point, is no lever") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    for (const double spread : {3.0, 0.0})
+      for (int run = 0; run < 20; ++run) {
+        const SE3 T = cairn_test::random_pose(random);
+        const Vector<3> start = normal3(random), along = normal3(random);
+        std::vector<PointMatch> data(30);
+        for (PointMatch& pair : data) {
+          const Vector<3> x = start + spread * random.normal() * along;
+          pair.source = x + 0.01 * normal3(random);
+          pair.target = T * x + 0.02 * normal3(random);
+          pair.source_covariance = 1e-4 * Matrix<3>::Identity();
+          pair.target_covariance = 4e-4 * Matrix<3>::Identity();
+        }
+        CHECK_FALSE(align_robustly(data).good());
+      }
+  }
+
+  // A covariance that turns with the motion: its derivative is part of the gradient.
+  TEST_CASE("align_robustly: long ellipsoids of two directions turn nothing") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    constexpr int runs = 50;
+    double nees = 0;
+    for (int run = 0; run < runs; ++run) {
+      const SE3 T = cairn_test::random_pose(random);
+      const Vector<3> a(0, 0, 3), b(2, 0, 2);
+      std::vector<PointMatch> data(400);
+      for (PointMatch& pair : data) {
+        const Vector<3> x = 6 * normal3(random), c = T.rotation() * b;
+        pair.source = x + random.normal() * a + normal3(random);
+        pair.target = T * x + random.normal() * c + normal3(random);
+        pair.source_covariance = a * a.transpose() + Matrix<3>::Identity();
+        pair.target_covariance = c * c.transpose() + Matrix<3>::Identity();
+      }
+      const RobustAlignment result = align_robustly(data);
+      REQUIRE(result.good());
+      const Vector<6> error = cairn::local(result.T_target_source, T);
+      nees += error.dot(result.information * error) / runs;
+    }
+    CAPTURE(nees);
+    CHECK(nees > cairn::chi_square_quantile(1e-4, 6 * runs) / runs);
+    CHECK(nees < cairn::chi_square_quantile(1 - 1e-4, 6 * runs) / runs);
+  }
+
   TEST_CASE("align_robustly: coordinates a million metres from the origin cost no accuracy") {
     cairn::Random random(cairn_test::seed());
     const Vector<3> far(1e6, -2e6, 5e5);

@@ -6,7 +6,14 @@
 ///
 /// LO-MSAC (ransac.hpp) over samples of three, closed form (alignment.hpp) for a sample, reweighted
 /// Gauss-Newton on the rest. A pair's residual r = T^-1 y - x, in the source frame, has covariance C = C_x +
-/// R^T C_y R and d r / d step = [-I, skew(T^-1 y)] for right steps of T_target_source. (1)
+/// R^T C_y R and d r / d step = [-I, skew(p)] for right steps of T_target_source. (1)
+///
+/// The lever p is where both sightings together put the point, p = T^-1 y - R^T C_y R C^-1 r: with T^-1 y in
+/// its place the step would leave out that C turns with R. Its noise, of covariance C_p = C_x C^-1 R^T C_y R,
+/// is lever too, so that J^T C^-1 J holds more of the rotation than there is to know,
+///   E[skew(n)^T W skew(n)] = W S + S W - tr(W) S - tr(S) W + (tr(W) tr(S) - tr(W S)) I,   W = C^-1, S = C_p
+///   (2)
+/// which is taken off; a direction that has less than four times as much beside it is undetermined.
 #pragma once
 
 #include <algorithm>
@@ -127,7 +134,7 @@ public:
 
   /// One reweighted Gauss-Newton step: its length in standard deviations, squared.
   [[nodiscard]] std::optional<double> step(SE3& motion, double gate) const {
-    const auto [information, gradient] = linearise(motion, gate, options_.loss);
+    const auto [information, gradient, noise] = linearise(motion, gate, options_.loss);
     const auto factor = factor_information(information);
     if (!factor) return std::nullopt;
     const Vector<6> d = factor->solve(gradient);
@@ -136,15 +143,25 @@ public:
   }
   [[nodiscard]] std::optional<double> step(SE3& motion) const { return step(motion, gate_); }
 
-  [[nodiscard]] Matrix<6> information(const SE3& motion) const {
-    return linearise(motion, gate_, RobustLoss::none).information *
-           robust_efficiency(options_.loss, options_.loss_scale, options_.gate_probability, gate_, 3);
+  /// Of the pairs that agree, without what is noise; nothing where that leaves a direction undetermined.
+  [[nodiscard]] std::optional<Matrix<6>> information(const SE3& motion) const {
+    constexpr double least_signal = 4;  // levers twice as long as their deviation
+    const auto [information, gradient, noise] = linearise(motion, gate_, RobustLoss::none);
+    Matrix<6> seen = information, doubtful = information;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        seen(3 + i, 3 + j) -= noise(i, j);
+        doubtful(3 + i, 3 + j) -= (1 + least_signal) * noise(i, j);
+      }
+    if (!factor_information(doubtful)) return std::nullopt;
+    return seen * robust_efficiency(options_.loss, options_.loss_scale, options_.gate_probability, gate_, 3);
   }
 
 private:
   struct Equations {
     Matrix<6> information;
     Vector<6> gradient;
+    Matrix<3> noise;  // of the levers, in the information of the rotation: (2)
   };
 
   struct Frame {
@@ -155,32 +172,40 @@ private:
   };
 
   struct Residual {
-    Vector<3> q, r;      // T^-1 y; q - x
-    Cholesky<3> factor;  // of the residual's covariance
+    Vector<3> q, r;       // T^-1 y; q - x
+    Matrix<3> of_target;  // R^T C_y R
+    Cholesky<3> factor;   // of the residual's covariance
     Residual(const PointMatch& pair, const Frame& frame)
-        : q(frame.T_source_target * pair.target), r(q - pair.source), factor(covariance(pair, frame)) {}
+        : q(frame.T_source_target * pair.target),
+          r(q - pair.source),
+          of_target(turned(pair, frame)),
+          factor(Matrix<3>(pair.source_covariance + of_target)) {}
     // Infinite where the covariance is not positive definite: nothing can be said.
     [[nodiscard]] double chi_squared() const noexcept {
       return factor.good() ? factor.whiten(r).squaredNorm() : std::numeric_limits<double>::infinity();
     }
-    [[nodiscard]] static Matrix<3> covariance(const PointMatch& pair, const Frame& frame) noexcept {
+    [[nodiscard]] static Matrix<3> turned(const PointMatch& pair, const Frame& frame) noexcept {
       const Matrix<3> half = product(frame.R_source_target, pair.target_covariance);
-      return pair.source_covariance + product_transposed(half, frame.R_source_target);
+      return product_transposed(half, frame.R_source_target);
     }
   };
 
   [[nodiscard]] Equations linearise(const SE3& motion, double gate, RobustLoss loss) const {
     const Frame frame(motion);
     Matrix<3> translation = Matrix<3>::Zero(), coupling = Matrix<3>::Zero(), rotation = Matrix<3>::Zero();
+    Matrix<3> noise = Matrix<3>::Zero();
     Vector<3> force = Vector<3>::Zero(), moment = Vector<3>::Zero();
     for (const PointMatch& pair : pairs_) {
       const Residual residual(pair, frame);
       const double chi_squared = residual.chi_squared();
       if (!(chi_squared < gate)) continue;
-      const Matrix<3> weight =
-          robust_weight(loss, options_.loss_scale, chi_squared) * residual.factor.inverse();
-      const Matrix<3> lever = skew(residual.q), weight_lever = product(weight, lever);
+      const Matrix<3> inverse = residual.factor.inverse();
+      const Matrix<3> weight = robust_weight(loss, options_.loss_scale, chi_squared) * inverse;
+      const Matrix<3> share = product(inverse, residual.of_target);  // C^-1 R^T C_y R
+      const Vector<3> point = residual.q - transposed_product(share, residual.r);
+      const Matrix<3> lever = skew(point), weight_lever = product(weight, lever);
       const Vector<3> pull = product(weight, residual.r);
+      noise += lever_noise(weight, symmetrised(product(pair.source_covariance, share)));
       translation += weight;
       coupling -= weight_lever;
       rotation += transposed_product(lever, weight_lever);
@@ -195,7 +220,17 @@ private:
     put(e.gradient, 0, 0, force);
     put(e.gradient, 3, 0, moment);
     e.information = symmetrised(e.information);
+    e.noise = noise;
     return e;
+  }
+
+  /// (2)
+  [[nodiscard]] static Matrix<3> lever_noise(const Matrix<3>& w, const Matrix<3>& s) {
+    const Matrix<3> both = product(w, s);
+    const double size_w = w.trace(), size_s = s.trace();
+    Matrix<3> result = both + both.transpose() - size_w * s - size_s * w;
+    for (int i = 0; i < 3; ++i) result(i, i) += size_w * size_s - both.trace();
+    return result;
   }
 
   std::span<const PointMatch> pairs_;
@@ -225,8 +260,9 @@ private:
     if (!length) return result;
     if (*length < 1e-6) break;
   }
-  const Matrix<6> information = problem.information(motion);
-  const auto factor = detail::factor_information(information);
+  const std::optional<Matrix<6>> information = problem.information(motion);
+  if (!information) return result;
+  const auto factor = detail::factor_information(*information);
   if (!factor) return result;
   const RansacScore score = problem.score(motion, std::numeric_limits<double>::infinity());
   result.status = !detail::enough_inliers(score.inliers, pairs.size(), options)
@@ -234,7 +270,7 @@ private:
                       : RobustAlignmentStatus::good;
   if (!result.good()) return result;
   result.T_target_source = motion;
-  result.information = information;
+  result.information = *information;
   result.covariance = factor->inverse();
   result.inlier_count = score.inliers;
   problem.inliers(motion, result.inliers);
