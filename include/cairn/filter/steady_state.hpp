@@ -12,6 +12,13 @@
 /// falls to nothing (E. Chu, H. Fan, W. Lin, C. Wang, "Structure-preserving algorithms for periodic
 /// discrete-time algebraic Riccati equations", Int. J. Control 77, 2004). States are taken in units of their
 /// own deviations, so that a small one settles as far as a large one does.
+///
+/// What rounding left is corrected by Newton's method: with K the gain of P and D what the equation says
+/// above P,
+///   P <- P + X,   X = A X A^T + D,   A = F (I - K H),
+/// by the doubling X <- X + A X A^T, A <- A A (G. Hewer, "An iterative technique for the computation of the
+/// steady state gains for the discrete optimal regulator", IEEE Trans. Automatic Control 16, 1971). X is what
+/// P was wrong by, where D is small of a filter that forgets slowly too.
 #pragma once
 
 #include <cmath>
@@ -71,16 +78,79 @@ template <int N, class S>
   return Status::not_converged;
 }
 
+/// Solves x = a x a^T + x0 for the x0 that x holds, in units of `deviation`; false where `a` does not fall to
+/// nothing.
+template <int N, class S>
+[[nodiscard]] bool sum_of_congruences(Matrix<N, N, S> a, const Vector<N, S>& deviation, Matrix<N, N, S>& x) {
+  using std::abs;
+  const int n = static_cast<int>(a.rows());
+  for (int round = 0; round < 64; ++round) {
+    x = symmetrised(x + column_product(a, column_product(x, transposed<N, N, S>(a))));
+    a = column_product(a, a);
+    if (!all_finite(x) || !all_finite(a)) return false;
+    bool settled = true;
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j)  // what has no deviation has no error either
+        settled = settled && (!(deviation(i) > S(0)) || abs(a(i, j)) * deviation(j) <=
+                                                            std::numeric_limits<S>::epsilon() * deviation(i));
+    if (settled) return true;
+  }
+  return false;
+}
+
+/// What a filter whose predicted covariance is result.predicted does at its next measurement.
+template <int N, int M, class S>
+[[nodiscard]] Status settled_update(const Matrix<M, N, S>& h, const Matrix<M, M, S>& r,
+                                    SteadyState<N, M, S>& result) {
+  const int n = static_cast<int>(h.cols()), m = static_cast<int>(h.rows());
+  ArrayUpdate<N, M, S> update;
+  const Status status = update_by_roots<N, M, S>(result.predicted, h, r, Vector<M, S>::Zero(m), update);
+  if (status != Status::accepted) return status;
+  result.updated = squared_root<N, S>(update.root);
+  for (int i = 0; i < n; ++i)  // K = white root_s^-1
+    for (int j = m - 1; j >= 0; --j) {
+      S sum = update.white(i, j);
+      for (int k = j + 1; k < m; ++k) sum -= result.gain(i, k) * update.root_s(k, j);
+      result.gain(i, j) = sum / update.root_s(j, j);
+    }
+  return Status::accepted;
+}
+
+/// Newton's method from a P that is nearly right, which result.predicted is.
+template <int N, int M, class S>
+[[nodiscard]] Status settle(const Matrix<N, N, S>& f, const Matrix<M, N, S>& h, const Matrix<N, N, S>& q,
+                            const Matrix<M, M, S>& r, SteadyState<N, M, S>& result) {
+  using std::abs;
+  using std::cbrt;
+  using std::sqrt;
+  const int n = static_cast<int>(f.rows());
+  const S tolerance = cbrt(std::numeric_limits<S>::epsilon());
+  for (int round = 0; round < 8; ++round) {
+    const Status status = settled_update(h, r, result);
+    if (status != Status::accepted) return status;
+    const Matrix<N, N, S> a = f - column_product(Matrix<N, M, S>(column_product(f, result.gain)), h);
+    Matrix<N, N, S> x = symmetrised(
+        column_product(f, column_product(result.updated, transposed<N, N, S>(f))) + q - result.predicted);
+    Vector<N, S> deviation = Vector<N, S>::Zero(n);
+    for (int i = 0; i < n; ++i) deviation(i) = sqrt(result.predicted(i, i));
+    if (!all_finite(deviation) || !sum_of_congruences<N, S>(a, deviation, x)) return Status::not_converged;
+    bool small = true;
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j <= i; ++j) small = small && abs(x(i, j)) <= tolerance * deviation(i) * deviation(j);
+    result.predicted += x;
+    if (round > 0 && small) return settled_update(h, r, result);
+  }
+  return Status::not_converged;
+}
+
 }  // namespace detail
 
 /// Steady state of x' = F x + noise(Q), z = H x + noise(R). Refused: not_converged, where no filter settles
-/// (a state that does not decay and is not seen, or is not driven) or the equation is not solved to half of
-/// the digits; not_positive_definite, where R is not, or Q is no covariance.
+/// (a state that does not decay and is not seen, or is not driven) or P is not known to a third of the
+/// digits, in deviations; not_positive_definite, where R is not, or Q is no covariance.
 template <int N, int M, class S>
 [[nodiscard]] SteadyState<N, M, S> steady_state(const Matrix<N, N, S>& f, const Matrix<M, N, S>& h,
                                                 const Matrix<N, N, S>& q, const Matrix<M, M, S>& r) {
-  using std::abs;
-  using std::sqrt;
   const int n = static_cast<int>(f.rows()), m = static_cast<int>(h.rows());
   SteadyState<N, M, S> result{q, q, Matrix<N, M, S>::Zero(n, m)};
   const auto refused = [&](Status status) {
@@ -125,25 +195,8 @@ template <int N, int M, class S>
   if (status != Status::accepted) return refused(status);
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) result.predicted(i, j) = p(i, j) * unit(i) * unit(j);
-  detail::ArrayUpdate<N, M, S> update;
-  status = detail::update_by_roots<N, M, S>(result.predicted, h, r, Vector<M, S>::Zero(m), update);
+  status = detail::settle<N, M, S>(f, h, q, r, result);
   if (status != Status::accepted) return refused(status);
-  result.updated = detail::squared_root<N, S>(update.root);
-  for (int i = 0; i < n; ++i)  // K = white root_s^-1
-    for (int j = m - 1; j >= 0; --j) {
-      S sum = update.white(i, j);
-      for (int k = j + 1; k < m; ++k) sum -= result.gain(i, k) * update.root_s(k, j);
-      result.gain(i, j) = sum / update.root_s(j, j);
-    }
-  const Matrix<N, N, S> next = symmetrised(
-      detail::column_product(f, detail::column_product(result.updated, transposed<N, N, S>(f))) + q);
-  const S tolerance = sqrt(std::numeric_limits<S>::epsilon());
-  for (int i = 0; i < n; ++i)
-    for (int j = 0; j <= i; ++j) {
-      const S size = sqrt(result.predicted(i, i)) * sqrt(result.predicted(j, j));
-      if (!(abs(next(i, j) - result.predicted(i, j)) <= tolerance * size))
-        return refused(Status::not_converged);
-    }
   return result;
 }
 
