@@ -12,6 +12,7 @@
 #include <cairn/filter/kalman.hpp>
 #include <cairn/filter/particle.hpp>
 #include <cairn/manifold/so2.hpp>
+#include <cairn/models/linear.hpp>
 
 #include "filter/linear_problems.hpp"
 #include "support/random.hpp"
@@ -171,6 +172,37 @@ TEST_SUITE("particle") {
     REQUIRE(cairn::resample_by_kld(uneven, {.least = 20000, .most = 20000}, bin, random) == Status::accepted);
     CHECK(uneven.size() == 20000);
     CHECK(std::abs(cairn::moments(uneven).mean(0) - 0.3) < 5 * std::sqrt(0.21 / 20000));
+  }
+
+  // z twice of x: the sum has variance 2 v + r, the difference r, which S = v + r, v as it is written has
+  // lost
+  TEST_CASE("ensemble: what two numbers differ by is judged where their spread hides it") {
+    const double v = 1e12, r = 1e-6, far = std::sqrt(1.5 * v);
+    const cairn::LinearSensor<2, 1> twice{Matrix<2, 1>(1, 1), r * Matrix<2>::Identity()};
+    cairn::Random random(1);
+    for (const auto form : {EnsembleForm::square_root, EnsembleForm::perturbed})
+      for (const double apart : {0.003, 0.03}) {  // nis 4.5 and 450
+        CAPTURE(apart);
+        Ensemble<Vector<1>> belief{{Vector<1>(-far), Vector<1>(0.0), Vector<1>(0.0), Vector<1>(far)}};
+        const double variance = 2 * far * far / 3;
+        const auto in = EnsembleKalman{.form = form, .gate = 20}.update(belief, twice,
+                                                                        Vector<2>(2e6, 2e6 + apart), random);
+        const double nis = apart * apart / (2 * r) + 0.5 * 4e6 * 4e6 / (2 * variance + r);
+        CHECK(in.status == (nis < 20 ? Status::accepted : Status::gated));
+        CHECK(in.nis == doctest::Approx(nis).epsilon(1e-5));
+        const double expected = -0.5 * (nis + std::log(r) + std::log(2 * variance + r)) - 1.8378770664093453;
+        CHECK(in.log_likelihood() == doctest::Approx(expected).epsilon(1e-5));
+      }
+  }
+
+  TEST_CASE("ensemble: an update that would leave what numbers hold is refused") {
+    const Ensemble<Vector<1>> before{{Vector<1>(1e308), Vector<1>(1e308 - 1e293), Vector<1>(1e308 + 1e293)}};
+    auto belief = before;
+    const cairn::LinearSensor<1, 1> weak{Matrix<1>(1e-293), Matrix<1>(1.0)};
+    cairn::Random random(1);
+    const auto in = EnsembleKalman{}.update(belief, weak, Vector<1>(4e15), random);
+    CHECK(in.status == Status::not_finite);
+    for (std::size_t i = 0; i < 3; ++i) CHECK(belief.members[i] == before.members[i]);
   }
 
   TEST_CASE("resample_by_kld: refuses what it cannot draw from") {

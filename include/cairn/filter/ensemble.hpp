@@ -143,17 +143,31 @@ struct EnsembleKalman {
     for (int i = 0; i < count; ++i) views.col(i) = local(expected, seen.members[static_cast<std::size_t>(i)]);
     const Matrix<m, m, S> spread = product_transposed(views, views) / static_cast<S>(count - 1);
     auto in = detail::fresh_innovation<m, S>(local(expected, plain.z()), symmetrised(spread + r));
-    in.nis = detail::squared_mahalanobis<m, S>(in.residual, in.covariance);
     Matrix<m, m, S> root = r;
-    in.status = judge<m, S>(in, r, root);
+    if (!all_finite(in.residual) || !all_finite(in.covariance) || !all_finite(r))
+      in.status = Status::not_finite;
+    else if (!detail::regular_root<m, S>(r, root))
+      in.status = Status::not_positive_definite;
     if (in.status != Status::accepted) return in;
-    const Tangent<X> shift = assimilate<dof<X>, m, S>(apart, views, root, in.residual, random);
+    Vector<m, S> residual = in.residual;
+    decorrelate<m, S>(root, views, residual);
+    in.status = judge<m, S>(in, root, views, residual);
+    if (in.status != Status::accepted) return in;
+    const Tangent<X> shift = assimilate<dof<X>, m, S>(apart, views, residual, random);
     if (!all_finite(apart) || !all_finite(shift)) {
       in.status = Status::not_finite;
       return in;
     }
-    for (int i = 0; i < count; ++i)
-      belief.members[static_cast<std::size_t>(i)] = retract(center, Tangent<X>(shift + apart.col(i)));
+    Ensemble<X> next;
+    next.members.reserve(belief.size());
+    for (int i = 0; i < count; ++i) {
+      next.members.push_back(retract(center, Tangent<X>(shift + apart.col(i))));
+      if (!detail::finite_state(next.members.back())) {
+        in.status = Status::not_finite;
+        return in;
+      }
+    }
+    belief = std::move(next);
     return in;
   }
 
@@ -172,22 +186,10 @@ private:
     return in;
   }
 
+  /// Turns the views and the residual into numbers of unit noise.
   template <int M, class S>
-  Status judge(const Innovation<M, S>& in, const Matrix<M, M, S>& r, Matrix<M, M, S>& root) const {
-    if (!all_finite(in.residual) || !all_finite(in.covariance) || !all_finite(r)) return Status::not_finite;
-    if (!detail::regular_root<M, S>(r, root)) return Status::not_positive_definite;
-    return in.nis <= static_cast<S>(gate) ? Status::accepted : Status::gated;
-  }
-
-  /// Corrects the distances `apart` and returns the correction of the mean; one number of unit noise after
-  /// the other.
-  template <int N, int M, class S>
-  Vector<N, S> assimilate(Matrix<N, dynamic, S>& apart, Matrix<M, dynamic, S>& views,
-                          const Matrix<M, M, S>& root, Vector<M, S> residual, Random& random) const {
-    using std::sqrt;
-    const int m = static_cast<int>(residual.size());
-    const int count = static_cast<int>(apart.cols());
-    for (int i = 0; i < m; ++i) {
+  static void decorrelate(const Matrix<M, M, S>& root, Matrix<M, dynamic, S>& views, Vector<M, S>& residual) {
+    for (int i = 0; i < static_cast<int>(residual.size()); ++i) {
       for (int k = 0; k < i; ++k) {
         views.row(i) -= root(i, k) * views.row(k);
         residual(i) -= root(i, k) * residual(k);
@@ -195,6 +197,39 @@ private:
       views.row(i) /= root(i, i);
       residual(i) /= root(i, i);
     }
+  }
+
+  /// Leaves in `in` the NIS and the determinant of S, which S as it is written may have lost: one number of
+  /// unit noise after the other, each given those before it as the square-root form has it.
+  template <int M, class S>
+  Status judge(Innovation<M, S>& in, const Matrix<M, M, S>& root, Matrix<M, dynamic, S> views,
+               Vector<M, S> residual) const {
+    using std::log;
+    using std::sqrt;
+    const S freedoms = static_cast<S>(views.cols() - 1);
+    in.log_determinant = S(0);
+    for (int j = 0; j < static_cast<int>(residual.size()); ++j) {
+      const Vector<dynamic, S> view = views.row(j).transpose();
+      const S s = view.squaredNorm() / freedoms + S(1);
+      const Vector<M, S> gain = (views * view) / (s * freedoms);
+      const S error = residual(j);
+      in.nis += error * error / s;
+      in.log_determinant += log(s) + S(2) * log(root(j, j));
+      residual -= gain * error;
+      views -= gain * (view / (S(1) + S(1) / sqrt(s))).transpose();
+    }
+    if (in.nis != in.nis) return Status::not_finite;
+    return in.nis <= static_cast<S>(gate) ? Status::accepted : Status::gated;
+  }
+
+  /// Corrects the distances `apart` and returns the correction of the mean; one number of unit noise after
+  /// the other.
+  template <int N, int M, class S>
+  Vector<N, S> assimilate(Matrix<N, dynamic, S>& apart, Matrix<M, dynamic, S>& views, Vector<M, S> residual,
+                          Random& random) const {
+    using std::sqrt;
+    const int m = static_cast<int>(residual.size());
+    const int count = static_cast<int>(apart.cols());
     Vector<N, S> shift = Vector<N, S>::Zero(apart.rows());
     Vector<dynamic, S> view(count), change(count);
     for (int j = 0; j < m; ++j) {
