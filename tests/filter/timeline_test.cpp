@@ -166,9 +166,13 @@ TEST_SUITE("timeline") {
     CHECK(tell(timeline, {2, 2.0, Vector<2>(nan, 0)}) == Status::not_finite);
     CHECK(tell(timeline, {2, 0.5, Vector<2>(0, nan)}) == Status::not_finite);
     CHECK(tell(timeline, {0, 0.5, Vector<2>(nan, 0)}) == Status::not_finite);
+    // the newest too: no prediction needs it yet, and none could be made after it
+    CHECK(tell(timeline, {0, 1.0, Vector<2>(nan, 0)}) == Status::not_finite);
+    CHECK(tell(timeline, {0, 1.5, Vector<2>(0, INFINITY)}) == Status::not_finite);
     CHECK_FALSE(timeline.at(nan).has_value());
     CHECK(timeline.size() == 1);
     CHECK(same(timeline.belief(), before));
+    CHECK(tell(timeline, {2, 2.0, Vector<2>(0, 1)}) == Status::accepted);
   }
 }
 

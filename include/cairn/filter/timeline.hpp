@@ -54,13 +54,16 @@ public:
            double horizon)
       : filter_(filter), process_(process), horizon_(horizon), base_{time, control, prior} {
     CAIRN_EXPECTS(horizon >= 0.0 && time - time == 0.0, "a Timeline needs a finite time and a horizon >= 0");
+    CAIRN_EXPECTS(finite_control(control), "a Timeline needs a finite control");
   }
 
-  /// The control is u from `time` until the next such event. Refused: as measure(), or where a prediction is.
+  /// The control is u from `time` until the next such event. Refused: as measure(), where a prediction is, or
+  /// where u is not finite, which would have every later prediction refused.
   template <class U = Control>
   Status steer(const U& u, double time) {
     const detail::Given<Control, U> given(u);
     if (given.misfit()) return Status::size_mismatch;
+    if (!finite_control(given.value())) return Status::not_finite;
     if constexpr (requires { requires Control::SizeAtCompileTime == dynamic; }) {
       Belief here = base_.after;  // what the process says of its size, before it is remembered
       const Status status = filter_.predict(here, process_, 0.0, given.value());
@@ -127,6 +130,15 @@ private:
         : Moment(moment), what(std::move(happened)) {}
   };
 
+  /// As far as one can tell: a control may be of any type.
+  [[nodiscard]] static bool finite_control(const Control& control) {
+    if constexpr (Manifold<Control>)
+      return detail::finite_state(control);
+    else if constexpr (requires { control.allFinite(); })
+      return control.allFinite();
+    else
+      return true;
+  }
   [[nodiscard]] Status accepts(double time) const {
     if (!(time - time == 0.0)) return Status::bad_time_step;
     const bool known = time >= base_.time && time >= this->time() - horizon_;
