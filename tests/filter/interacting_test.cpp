@@ -69,6 +69,28 @@ TEST_SUITE("interacting") {
     CHECK(combined.mean(0) == doctest::Approx(both).epsilon(1e-12));
     CHECK(combined.covariance(0, 0) == doctest::Approx(spread).epsilon(1e-12));
   }
+
+  TEST_CASE("interacting: a mode that cannot be leaves the others alone, whatever it holds") {
+    const std::array<std::array<double, 2>, 2> p{{{1.0, 0.0}, {0.5, 0.5}}};
+    const cairn::Interacting<2, cairn::Kalman> filter{.switching = p};
+    const auto processes = std::tuple(cairn::LinearModel<1>{Matrix<1>(1.0), Matrix<1>(1.0)},
+                                      cairn::LinearModel<1>{Matrix<1>(1e10), Matrix<1>(1.0)});
+    const cairn::LinearSensor<1, 1> sensor{Matrix<1>(1.0), Matrix<1>(2.0)};
+    cairn::ModeBelief<Vector<1>, 2> belief{{cairn::Gaussian<Vector<1>>{Vector<1>(1.0), Matrix<1>(1.0)},
+                                            cairn::Gaussian<Vector<1>>{Vector<1>(1.0), Matrix<1>(1.0)}},
+                                           {1.0, 0.0}};
+    for (int step = 0; step < 40; ++step) {  // the second one's variance leaves what numbers hold after 15
+      CAPTURE(step);
+      REQUIRE(filter.predict(belief, processes, 1.0) == Status::accepted);
+      REQUIRE(filter.update(belief, sensor, Vector<1>(1.0)) == Status::accepted);
+      CHECK(belief.combined().covariance(0, 0) == doctest::Approx(1.0).epsilon(1e-12));
+    }
+    belief.modes[1].mean(0) = std::nan("");
+    REQUIRE(filter.predict(belief, processes, 1.0) == Status::accepted);
+    CHECK(belief.combined().mean(0) == doctest::Approx(1.0));
+    CHECK(belief.combined().covariance(0, 0) == doctest::Approx(2.0).epsilon(1e-12));
+    CHECK(filter.predict(belief, processes, -1.0) == Status::bad_time_step);
+  }
 }
 
 }  // namespace interacting_test

@@ -19,6 +19,7 @@
 #include <cstddef>
 #include <limits>
 #include <tuple>
+#include <type_traits>
 #include <utility>
 
 #include <cairn/core/check.hpp>
@@ -92,11 +93,13 @@ struct ModeBelief {
     X mean = parts[heaviest].mean;
     for (int round = 0; round < 2; ++round) {
       Tangent<X> shift = Tangent<X>::Zero(dof_of(mean));
-      for (std::size_t i = 0; i < R; ++i) shift += static_cast<S>(weights[i]) * local(mean, parts[i].mean);
+      for (std::size_t i = 0; i < R; ++i)  // what has no weight may be anything
+        if (weights[i] > 0.0) shift += static_cast<S>(weights[i]) * local(mean, parts[i].mean);
       mean = retract(mean, shift);
     }
     CovarianceOf<X> covariance = CovarianceOf<X>::Zero(dof_of(mean), dof_of(mean));
     for (std::size_t i = 0; i < R; ++i) {
+      if (!(weights[i] > 0.0)) continue;
       const Tangent<X> d = local(mean, parts[i].mean);
       covariance += static_cast<S>(weights[i]) * (parts[i].covariance + d * d.transpose());
     }
@@ -110,7 +113,8 @@ struct Interacting {
   Filter filter{};
   std::array<std::array<double, R>, R> switching{};
 
-  /// Mixes, then moves every mode by its own process of `processes`. All or none are kept. Refused: rows of
+  /// Mixes, then moves every mode by its own process of `processes`. All or none are kept, but a mode that
+  /// cannot be (of probability zero) stays where it is if its process refuses. Refused: rows of
   /// `switching` that do not sum to 1 (bad_option), probabilities that are none (see ModeBelief::weighed).
   template <Manifold X, class Mode, class... F,
             class U = typename std::tuple_element_t<0, std::tuple<F...>>::Control>
@@ -137,10 +141,11 @@ struct Interacting {
     }
     Status status = Status::accepted;
     [&]<std::size_t... J>(std::index_sequence<J...>) {
-      ((status = status != Status::accepted
-                     ? status
-                     : filter.predict(next.modes[J], std::get<J>(processes), dt, control)),
-       ...);
+      const auto move = [&]<std::size_t Of>(std::integral_constant<std::size_t, Of>) {
+        const Status moved = filter.predict(next.modes[Of], std::get<Of>(processes), dt, control);
+        if (status == Status::accepted && next.probability[Of] > 0.0) status = moved;
+      };
+      (move(std::integral_constant<std::size_t, J>{}), ...);
     }(std::make_index_sequence<R>{});
     double sum = 0.0;
     for (const double p : next.probability) sum += p;
