@@ -81,6 +81,8 @@ consteval auto entries_of() {
 
 template <int Columns, int... Chosen>
 consteval auto selection_pattern() {
+  static_assert(((Chosen >= 0 && Chosen < Columns) && ...),
+                "cairn: Selection<N, rows...> takes rows of the N x N identity, numbered from 0");
   constexpr int rows = sizeof...(Chosen);
   Pattern<static_cast<std::size_t>(rows) * (Columns + 1)> pattern;
   int row = 0;
