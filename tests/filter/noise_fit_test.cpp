@@ -95,6 +95,11 @@ TEST_SUITE("noise_fit") {
     CHECK(cairn::fit_noise(record, level, flow, {.rounds = -1}).status == Status::bad_option);
     CHECK(cairn::fit_noise(record, level, flow, {.tolerance = -1}).status == Status::bad_option);
     CHECK(cairn::fit_noise(record, level, flow, {.rounds = 0}).status == Status::not_converged);
+    record.prior.covariance(0) = -0.5;  // the first prediction makes a covariance of it, smoothing cannot
+    CHECK(cairn::fit_noise(record, level, flow, {.tolerance = 1e-3, .process = false}).status ==
+          Status::not_positive_definite);
+    record.prior.covariance(0) = std::nan("");
+    CHECK(cairn::fit_noise(record, level, flow).status == Status::not_finite);
   }
 
 #ifdef EXAMPLES_HAVE_ZLIB

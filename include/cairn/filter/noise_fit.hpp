@@ -12,7 +12,6 @@
 /// hundreds of rounds. Elsewhere the linearisation makes both approximate.
 #pragma once
 
-#include <concepts>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -172,12 +171,11 @@ template <class Filter = Kalman, class F, class H>
   NoiseFit<F, H> fit{
       Q::Zero(n, n).eval(), detail::noise_at(sensor, record.prior.mean, misfit), {}, Status::depleted};
   if (record.steps.empty()) return fit;
-  if constexpr (!std::same_as<BeliefOf<Filter, typename F::State>, Gaussian<typename F::State>>)
-    if (n > 0 && !detail::is_valid_covariance<dof<typename F::State>, ScalarOf<typename F::State>>(
-                     record.prior.covariance)) {
-      fit.status = Status::not_positive_definite;
-      return fit;
-    }
+  if (n > 0 && !detail::is_valid_covariance<dof<typename F::State>, ScalarOf<typename F::State>>(
+                   record.prior.covariance)) {
+    fit.status = all_finite(record.prior.covariance) ? Status::not_positive_definite : Status::not_finite;
+    return fit;
+  }
   const detail::PlainProcess plain(process, n, record.steps[0].control);
   fit.process = detail::dense_of(plain.noise(record.prior.mean, record.steps[0].dt));
   if (misfit || plain.misfit()) {
