@@ -10,6 +10,8 @@
 /// squares: with P(k|k) = L L^T, F L the image of L by the motion and everything else that P(k+1|k) consists
 /// of as W W^T,
 ///   V_k = (L - G_k F L)(L - G_k F L)^T + G_k W (G_k W)^T
+/// G brings back what the state after says, so that a number whose deviation is a millionth of those that the
+/// motion mixes it with is not better known of the smoothed moment than P(k+1|T) as a matrix can hold it.
 /// (H. Rauch, F. Tung, C. Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA Journal 3,
 /// 1965; S. Sarkka, "Unscented Rauch-Tung-Striebel smoother", IEEE Trans. Automatic Control 53, 2008.)
 ///

@@ -10,7 +10,9 @@
 /// whitened with pixel noise and landmark covariance (stereo_residual.hpp): points at 5 m and at 50 m then
 /// weigh what they are worth, which distances in space cannot express.
 ///
-/// Covariance: inverse of the inliers' information, corrected for what the loss and the gate cost.
+/// Covariance: inverse of the inliers' information, corrected for what the loss and the gate cost. Landmarks
+/// are levers as they stand: where all are on a line, what their own covariance puts beside it counts as if
+/// it were known, and the pose is called good (robust_alignment.hpp takes that off).
 /// Cost: O(matches) for each of some 10 to 70 samples.
 #pragma once
 
