@@ -35,7 +35,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     next.T_odom_laser = next.T_odom_laser * cairn::SE2(0.5, 0, 0);
     mapper.add(next);
   } catch (const cairn::Error&) {
-    return 0;
+    return cairn_fuzz::refused();
   }
   return 0;
 }

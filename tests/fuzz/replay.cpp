@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: MIT
 //
 // NAME_replay FOLDER...: gives every file of the folders to a fuzz target, as scripts/fuzz once did. Ends as
-// a finding ends it, or with 0; with 1 where there is nothing to replay.
+// a finding ends it, or with 0; with 1 where none is read: the corpus is empty, or has another format than
+// the reader.
 #include <algorithm>
 #include <cstdint>
 #include <cstdio>
@@ -11,6 +12,8 @@
 #include <fstream>
 #include <iterator>
 #include <vector>
+
+#include "fuzz/scratch.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size);
 
@@ -28,8 +31,8 @@ int main(int argc, char** argv) try {
     std::fflush(stdout);  // the last name is that of a finding
     static_cast<void>(LLVMFuzzerTestOneInput(bytes.data(), bytes.size()));
   }
-  std::printf("%zu inputs replayed\n", inputs.size());
-  return inputs.empty() ? 1 : 0;
+  std::printf("%zu inputs replayed, %zu refused\n", inputs.size(), cairn_fuzz::refusals);
+  return cairn_fuzz::refusals < inputs.size() ? 0 : 1;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "replay: %s\n", error.what());
   return 1;

@@ -19,7 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     rig = example::parse_rig(cairn_fuzz::text_of(data, size), "rig.yaml");
   } catch (const cairn::Error& error) {
     cairn_fuzz::expect(std::string(error.what()).starts_with("rig.yaml"), "a refusal names the file");
-    return 0;
+    return cairn_fuzz::refused();
   }
   cairn_fuzz::expect(cairn::all_finite(rig.rig.T_left_right.matrix()) && rig.rig.baseline() > 0 &&
                          rig.rig.left.fx() > 0 && rig.rig.right.fy() > 0,

@@ -21,6 +21,8 @@
 #include <cairn/index/axis_metrics.hpp>
 #include <cairn/index/tree_file.hpp>
 
+#include "fuzz/scratch.hpp"
+
 namespace {
 
 void require(bool condition, const char* sentence) {
@@ -81,6 +83,7 @@ void load(const std::string& bytes, typename Tree::Measure metric = {}) {
       return cairn::load_tree<Tree>(in, "input", metric);
     } catch (const cairn::Error& error) {
       require(std::string_view(error.what()).substr(0, 7) == "input: ", "an Error without the name");
+      cairn_fuzz::refused();
       return Tree();
     }
   }();
