@@ -259,7 +259,10 @@ TEST_SUITE("particle") {
     CHECK(update({{0, Vector<1>(5.0)}, {1, Vector<1>(std::nan(""))}}) == Status::not_finite);
     for (std::size_t i = 0; i < belief.size(); ++i) {
       CHECK(belief.log_weights[i] == before.log_weights[i]);
-      CHECK(&belief.states[i].parts[0] == &before.states[i].parts[0]);
+      for (const std::size_t part : {0U, 1U}) {
+        CHECK(belief.states[i].parts[part].mean == before.states[i].parts[part].mean);
+        CHECK(belief.states[i].parts[part].covariance == before.states[i].parts[part].covariance);
+      }
     }
     CHECK(update({}) == Status::accepted);
     belief.states.clear();

@@ -323,13 +323,21 @@ struct ParticleFilter {
   UpdateResult update_with(Particles<X>& belief, std::span<const double> log_likelihoods,
                            Random& random) const {
     if (belief.states.empty()) return Status::depleted;
-    if (!(resample_below >= 0.0 && resample_below <= 1.0)) return Status::bad_option;
+    if (!valid()) return Status::bad_option;
     const Status status = belief.reweigh(log_likelihoods);
-    if (status != Status::accepted) return status;
-    if (belief.effective_size() < resample_below * static_cast<double>(belief.size()))
-      belief.resample(belief.size(), scheme, random);
+    if (status == Status::accepted) resample_if_needed(belief, random);
     return status;
   }
+
+  /// Draws the particles anew where their weights have degenerated: for who weighs them in several steps, by
+  /// Particles::reweigh, and draws once.
+  template <class X>
+  void resample_if_needed(Particles<X>& belief, Random& random) const {
+    if (belief.effective_size() < resample_below * static_cast<double>(belief.size()))
+      belief.resample(belief.size(), scheme, random);
+  }
+  /// Its options are within their ranges.
+  [[nodiscard]] bool valid() const noexcept { return resample_below >= 0.0 && resample_below <= 1.0; }
 };
 
 }}  // namespace cairn::CAIRN_ABI

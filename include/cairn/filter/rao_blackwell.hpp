@@ -70,6 +70,36 @@ struct PartSighting {
 
 namespace detail {
 
+/// Changes parts of particles, and changes them back unless that is forgotten.
+template <Manifold X, Manifold Part>
+class PartsAsTheyWere {
+public:
+  PartsAsTheyWere(ConditionalParticles<X, Part>& belief, std::size_t changes_each) : belief_(belief) {
+    were_.reserve(belief.size() * changes_each);
+  }
+  ~PartsAsTheyWere() {  // last change first; what was written is the particle's own, so that nothing is
+                        // copied
+    for (; !were_.empty(); were_.pop_back())
+      belief_.states[were_.back().particle].parts.write(were_.back().part) = std::move(were_.back().value);
+  }
+  PartsAsTheyWere(const PartsAsTheyWere&) = delete;
+  PartsAsTheyWere& operator=(const PartsAsTheyWere&) = delete;
+
+  void change(std::size_t particle, std::size_t part, Gaussian<Part> to) {
+    Gaussian<Part>& own = belief_.states[particle].parts.write(part);
+    were_.push_back({particle, part, std::exchange(own, std::move(to))});
+  }
+  void forget() noexcept { were_.clear(); }
+
+private:
+  struct Was {
+    std::size_t particle, part;
+    Gaussian<Part> value;
+  };
+  ConditionalParticles<X, Part>& belief_;
+  std::vector<Was> were_;
+};
+
 /// The sensor as an ordinary one over the part, the sampled state held.
 template <ConditionalMeasurement H>
 struct HeldSensor {
@@ -115,11 +145,11 @@ struct RaoBlackwell {
   UpdateResult update(ConditionalParticles<typename H::State, typename H::Part>& belief, const H& sensor,
                       std::span<const PartSighting<typename H::Measurement>> seen, Random& random) const {
     if (belief.states.empty()) return Status::depleted;
-    ConditionalParticles<typename H::State, typename H::Part> next = belief;
     std::vector<double> log_likelihoods(belief.size(), 0.0);
+    detail::PartsAsTheyWere before(belief, seen.size());
     Status refused = Status::depleted;
-    for (std::size_t i = 0; i < next.size(); ++i) {
-      auto& [state, own] = next.states[i];
+    for (std::size_t i = 0; i < belief.size(); ++i) {
+      const auto& [state, own] = belief.states[i];
       for (const auto& [part, z] : seen) {
         if (part >= own.size()) return Status::size_mismatch;
         Gaussian<typename H::Part> updated = own[part];
@@ -127,14 +157,17 @@ struct RaoBlackwell {
         if (in.status == Status::size_mismatch) return in.status;
         log_likelihoods[i] += log_likelihood(in);
         if (in.accepted())
-          own.write(part) = std::move(updated);
+          before.change(i, part, std::move(updated));
         else if (in.status != Status::gated)
           refused = in.status;
       }
     }
-    const UpdateResult result = particles.update_with(next, log_likelihoods, random);
-    if (result.accepted()) belief = std::move(next);
-    return result.status == Status::depleted ? UpdateResult(refused) : result;
+    if (!particles.valid()) return Status::bad_option;
+    const Status status = belief.reweigh(log_likelihoods);
+    if (status != Status::accepted) return status == Status::depleted ? refused : status;
+    before.forget();
+    particles.resample_if_needed(belief, random);
+    return status;
   }
 
   /// The same where one part was seen.
