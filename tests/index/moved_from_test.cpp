@@ -12,6 +12,7 @@
 
 #include <doctest/doctest.h>
 
+#include <cairn/core/shared_array.hpp>
 #include <cairn/index/box_query.hpp>
 #include <cairn/index/brute_force.hpp>
 #include <cairn/index/descriptor_file.hpp>
@@ -23,7 +24,6 @@
 #include <cairn/index/multi_tree_file.hpp>
 #include <cairn/index/nearest_first.hpp>
 #include <cairn/index/packed_points.hpp>
-#include <cairn/core/shared_array.hpp>
 #include <cairn/index/shared_kd_tree.hpp>
 #include <cairn/index/tree_file.hpp>
 

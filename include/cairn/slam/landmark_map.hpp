@@ -57,13 +57,13 @@
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/random.hpp>
+#include <cairn/core/shared_array.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/filter/conditional.hpp>
 #include <cairn/filter/extended.hpp>
 #include <cairn/filter/gaussian.hpp>
 #include <cairn/filter/rao_blackwell.hpp>
 #include <cairn/filter/status.hpp>
-#include <cairn/core/shared_array.hpp>
 #include <cairn/index/shared_kd_tree.hpp>
 #include <cairn/manifold/manifold.hpp>
 #include <cairn/version.hpp>
