@@ -20,7 +20,6 @@
 
 namespace cairn_fuzz {
 
-/// The fuzzer sees an aborted program as a finding.
 /// Inputs that the target has refused so far, for the replay: a corpus of nothing else has another format
 /// than the reader.
 inline std::size_t refusals = 0;
@@ -29,6 +28,7 @@ inline int refused() {
   return 0;
 }
 
+/// The fuzzer sees an aborted program as a finding.
 inline void expect(bool kept, const char* promise) {
   if (kept) return;
   std::fprintf(stderr, "broken promise: %s\n", promise);

@@ -199,58 +199,72 @@ private:
     }
   }
 
-  /// Leaves in `in` the NIS and the determinant of S, which S as it is written may have lost: one number of
-  /// unit noise after the other, each given those before it as the square-root form has it.
+  /// One number of unit noise: its views, their variance with the noise, and how far it is off.
+  template <class S>
+  struct Number {
+    Vector<dynamic, S> view;
+    S variance, error;
+    S scale;  // of a covariance with the views: to a gain
+  };
+  /// Takes the numbers one after the other, each given those before it. `change(number)` is how the members
+  /// move per gain, once the caller has what it wants of the number.
+  template <int M, class S, class Change>
+  static void one_by_one(Matrix<M, dynamic, S>& views, Vector<M, S> residual, const Change& change) {
+    const S freedoms = static_cast<S>(views.cols() - 1);
+    Number<S> number;
+    for (int j = 0; j < static_cast<int>(residual.size()); ++j) {
+      number.view = views.row(j).transpose();
+      number.variance = number.view.squaredNorm() / freedoms + S(1);
+      number.scale = S(1) / (number.variance * freedoms);
+      number.error = residual(j);
+      const Vector<M, S> gain = number.scale * (views * number.view);
+      const Vector<dynamic, S> moved = change(j, number);
+      residual -= gain * number.error;
+      views += gain * moved.transpose();
+    }
+  }
+  /// The square-root form's.
+  template <class S>
+  [[nodiscard]] static Vector<dynamic, S> shrunk(const Number<S>& number) {
+    using std::sqrt;
+    return number.view * (S(-1) / (S(1) + S(1) / sqrt(number.variance)));
+  }
+
+  /// Leaves in `in` the NIS and the determinant of S, which S as it is written may have lost.
   template <int M, class S>
   Status judge(Innovation<M, S>& in, const Matrix<M, M, S>& root, Matrix<M, dynamic, S> views,
-               Vector<M, S> residual) const {
+               const Vector<M, S>& residual) const {
     using std::log;
-    using std::sqrt;
-    const S freedoms = static_cast<S>(views.cols() - 1);
     in.log_determinant = S(0);
-    for (int j = 0; j < static_cast<int>(residual.size()); ++j) {
-      const Vector<dynamic, S> view = views.row(j).transpose();
-      const S s = view.squaredNorm() / freedoms + S(1);
-      const Vector<M, S> gain = (views * view) / (s * freedoms);
-      const S error = residual(j);
-      in.nis += error * error / s;
-      in.log_determinant += log(s) + S(2) * log(root(j, j));
-      residual -= gain * error;
-      views -= gain * (view / (S(1) + S(1) / sqrt(s))).transpose();
-    }
+    one_by_one<M, S>(views, residual, [&](int j, const Number<S>& number) {
+      in.nis += number.error * number.error / number.variance;
+      in.log_determinant += log(number.variance) + S(2) * log(root(j, j));
+      return shrunk(number);
+    });
     if (in.nis != in.nis) return Status::not_finite;
     return in.nis <= static_cast<S>(gate) ? Status::accepted : Status::gated;
   }
 
-  /// Corrects the distances `apart` and returns the correction of the mean; one number of unit noise after
-  /// the other.
+  /// Corrects the distances `apart` and returns the correction of the mean.
   template <int N, int M, class S>
-  Vector<N, S> assimilate(Matrix<N, dynamic, S>& apart, Matrix<M, dynamic, S>& views, Vector<M, S> residual,
-                          Random& random) const {
-    using std::sqrt;
-    const int m = static_cast<int>(residual.size());
+  Vector<N, S> assimilate(Matrix<N, dynamic, S>& apart, Matrix<M, dynamic, S>& views,
+                          const Vector<M, S>& residual, Random& random) const {
     const int count = static_cast<int>(apart.cols());
     Vector<N, S> shift = Vector<N, S>::Zero(apart.rows());
-    Vector<dynamic, S> view(count), change(count);
-    for (int j = 0; j < m; ++j) {
-      view = views.row(j).transpose();
-      const S s = view.squaredNorm() / static_cast<S>(count - 1) + S(1);
-      const S scale = S(1) / (s * static_cast<S>(count - 1));
-      const Vector<N, S> gain = scale * (apart * view);
-      const Vector<M, S> gain_of_views = scale * (views * view);
+    one_by_one<M, S>(views, residual, [&](int, const Number<S>& number) {
+      Vector<dynamic, S> change(count);
+      const Vector<N, S> gain = number.scale * (apart * number.view);
       if (form == EnsembleForm::square_root) {
-        change = view * (S(-1) / (S(1) + S(1) / sqrt(s)));
+        change = shrunk(number);
       } else {
         for (int i = 0; i < count; ++i) change(i) = static_cast<S>(random.normal());
         change.array() -= change.mean();
-        change -= view;
+        change -= number.view;
       }
-      const S error = residual(j);
-      shift += gain * error;
-      residual -= gain_of_views * error;
+      shift += gain * number.error;
       apart += gain * change.transpose();
-      views += gain_of_views * change.transpose();
-    }
+      return change;
+    });
     return shift;
   }
 };

@@ -134,7 +134,7 @@ public:
 
   /// One reweighted Gauss-Newton step: its length in standard deviations, squared.
   [[nodiscard]] std::optional<double> step(SE3& motion, double gate) const {
-    const auto [information, gradient, noise] = linearise(motion, gate, options_.loss);
+    const auto [information, gradient] = linearise(motion, gate, options_.loss);
     const auto factor = factor_information(information);
     if (!factor) return std::nullopt;
     const Vector<6> d = factor->solve(gradient);
@@ -146,7 +146,8 @@ public:
   /// Of the pairs that agree, without what is noise; nothing where that leaves a direction undetermined.
   [[nodiscard]] std::optional<Matrix<6>> information(const SE3& motion) const {
     constexpr double least_signal = 4;  // levers twice as long as their deviation
-    const auto [information, gradient, noise] = linearise(motion, gate_, RobustLoss::none);
+    const Matrix<6> information = linearise(motion, gate_, RobustLoss::none).information;
+    const Matrix<3> noise = lever_noise(motion);
     Matrix<6> seen = information, doubtful = information;
     for (int i = 0; i < 3; ++i)
       for (int j = 0; j < 3; ++j) {
@@ -161,7 +162,6 @@ private:
   struct Equations {
     Matrix<6> information;
     Vector<6> gradient;
-    Matrix<3> noise;  // of the levers, in the information of the rotation: (2)
   };
 
   struct Frame {
@@ -193,7 +193,6 @@ private:
   [[nodiscard]] Equations linearise(const SE3& motion, double gate, RobustLoss loss) const {
     const Frame frame(motion);
     Matrix<3> translation = Matrix<3>::Zero(), coupling = Matrix<3>::Zero(), rotation = Matrix<3>::Zero();
-    Matrix<3> noise = Matrix<3>::Zero();
     Vector<3> force = Vector<3>::Zero(), moment = Vector<3>::Zero();
     for (const PointMatch& pair : pairs_) {
       const Residual residual(pair, frame);
@@ -205,7 +204,6 @@ private:
       const Vector<3> point = residual.q - transposed_product(share, residual.r);
       const Matrix<3> lever = skew(point), weight_lever = product(weight, lever);
       const Vector<3> pull = product(weight, residual.r);
-      noise += lever_noise(weight, symmetrised(product(pair.source_covariance, share)));
       translation += weight;
       coupling -= weight_lever;
       rotation += transposed_product(lever, weight_lever);
@@ -220,17 +218,24 @@ private:
     put(e.gradient, 0, 0, force);
     put(e.gradient, 3, 0, moment);
     e.information = symmetrised(e.information);
-    e.noise = noise;
     return e;
   }
 
-  /// (2)
-  [[nodiscard]] static Matrix<3> lever_noise(const Matrix<3>& w, const Matrix<3>& s) {
-    const Matrix<3> both = product(w, s);
-    const double size_w = w.trace(), size_s = s.trace();
-    Matrix<3> result = both + both.transpose() - size_w * s - size_s * w;
-    for (int i = 0; i < 3; ++i) result(i, i) += size_w * size_s - both.trace();
-    return result;
+  /// What the noise of the levers adds to the information of the rotation, of the pairs that agree: (2).
+  [[nodiscard]] Matrix<3> lever_noise(const SE3& motion) const {
+    const Frame frame(motion);
+    Matrix<3> sum = Matrix<3>::Zero();
+    for (const PointMatch& pair : pairs_) {
+      const Residual residual(pair, frame);
+      if (!(residual.chi_squared() < gate_)) continue;
+      const Matrix<3> w = residual.factor.inverse();
+      const Matrix<3> s = symmetrised(product(pair.source_covariance, product(w, residual.of_target)));
+      const Matrix<3> both = product(w, s);
+      const double size_w = w.trace(), size_s = s.trace();
+      sum += both + both.transpose() - size_w * s - size_s * w;
+      for (int i = 0; i < 3; ++i) sum(i, i) += size_w * size_s - both.trace();
+    }
+    return sum;
   }
 
   std::span<const PointMatch> pairs_;
