@@ -6,6 +6,7 @@
 #include <vector>
 
 #include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
@@ -148,6 +149,66 @@ TEST_SUITE("smoother") {
     CHECK_FALSE(recorder.lagged(steps + 1).has_value());
     recorder.keep_last(2);
     CHECK((recorder.lagged(2)->mean - path[steps - 2].mean).norm() == 0.0);
+  }
+
+  // What was never seen is not better known afterwards, however the motion mixes large with small numbers.
+  TEST_CASE("smoother: a record without sightings is smoothed to what was predicted, scales 1e-6 to 1e6") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const auto covariance = [&](int rank) {
+      Matrix<3> root = Matrix<3>::Zero();
+      for (int i = 0; i < 3; ++i) {
+        const double sigma = std::pow(10.0, 12.0 * random.uniform() - 6.0);
+        for (int j = 0; j < rank; ++j) root(i, j) = sigma * random.normal();
+      }
+      return cairn::symmetrised(Matrix<3>(root * root.transpose()));
+    };
+    constexpr int records = 500;
+    int off = 0;
+    for (int record = 0; record < records; ++record) {
+      std::vector<Matrix<3>> known{covariance(record % 4 == 0 ? 2 : 3)};
+      Recorder<Kalman, Vector<3>> recorder(Kalman{}, {Vector<3>::Zero(), known[0]});
+      for (int k = 0; k < 4; ++k) {
+        cairn::LinearModel<3> process{Matrix<3>::Zero(), covariance((record + k) % 4)};
+        for (int i = 0; i < 9; ++i) process.transition(i) = random.normal();
+        REQUIRE(recorder.predict(process, 1.0) == Status::accepted);
+        known.push_back(recorder.belief().covariance);
+      }
+      const auto path = recorder.smoothed();
+      bool wrong = false;
+      for (std::size_t k = 0; k < known.size(); ++k)
+        for (int i = 0; i < 3; ++i)
+          wrong = wrong || std::abs(path[k].covariance(i, i) - known[k](i, i)) > 1e-3 * known[k](i, i);
+      off += wrong ? 1 : 0;
+    }
+    CHECK(off <= 20);  // 6 usually, where directions have just so many digits that they count; 50 if all did
+  }
+
+  TEST_CASE(
+      "smoother: a prediction that rounding has left no covariance is made one, and bad priors refused") {
+    int mended = 0;
+    for (int k = 1; k < 20; ++k) {
+      const double small = 1e-7 * k;
+      const cairn::LinearModel<2> process{Matrix<2>{{1, small - 1}, {0.7, 0.1}}, Matrix<2>::Zero()};
+      const Gaussian<Vector<2>> prior{Vector<2>::Zero(), Matrix<2>::Ones()};
+      Gaussian<Vector<2>> plain = prior;
+      REQUIRE(Kalman{}.predict(plain, process, 1.0) == Status::accepted);
+      Recorder<Kalman, Vector<2>> recorder(Kalman{}, prior);
+      REQUIRE(recorder.predict(process, 1.0) == Status::accepted);
+      if (plain.covariance.determinant() < -1e-12 * plain.covariance.diagonal().prod()) ++mended;
+      CHECK(recorder.belief().covariance(0, 0) == doctest::Approx(small * small).epsilon(0.02));
+      const auto path = recorder.smoothed();
+      CHECK((path[0].covariance - Matrix<2>::Ones()).norm() < 1e-6);
+    }
+    CHECK(mended > 3);
+
+    Matrix<2> indefinite{{1, 2}, {2, 1}};
+    Recorder<Kalman, Vector<2>> recorder(Kalman{}, {Vector<2>::Ones(), indefinite});
+    const cairn::LinearModel<2> waiting{Matrix<2>::Identity(), 9 * Matrix<2>::Identity()};
+    CHECK(recorder.predict(waiting, 1.0) == Status::not_positive_definite);
+    CHECK(recorder.belief().covariance == indefinite);
+    CHECK(recorder.steps().empty());
   }
 }
 

@@ -242,10 +242,12 @@ template <class S>
 }
 
 /// Householder on the first `count` columns, where some may depend on others: rows(j) is the row in which
-/// column j has its pivot, or -1 where it has none above its own rounding. Each pivot takes the next row.
+/// column j has its pivot, or -1 where it has none: where a^T a as a matrix holds less than three digits of
+/// what is left of the column. Each pivot takes the next row.
 template <int C, int R, int N, class S>
 void to_echelon(Matrix<C, R, S>& a, int count, Vector<N, int>& rows) {
   using std::sqrt;
+  constexpr S held = S(1024) * std::numeric_limits<S>::epsilon();
   int row = 0;
   for (int j = 0; j < count; ++j) {
     S whole(0), squared(0);
@@ -254,8 +256,8 @@ void to_echelon(Matrix<C, R, S>& a, int count, Vector<N, int>& rows) {
       if (i > row) squared += a(i, j) * a(i, j);
     }
     const S head = row < static_cast<int>(a.rows()) ? a(row, j) : S(0);
-    const S norm = sqrt(head * head + squared);
-    rows(j) = norm > digits_left<S> * sqrt(whole) ? row : -1;
+    const S left = head * head + squared, norm = sqrt(left);
+    rows(j) = left > held * whole ? row : -1;
     if (rows(j) < 0) continue;
     const S first = head > S(0) ? head + norm : head - norm;
     const S factor = S(2) / (first * first + squared);

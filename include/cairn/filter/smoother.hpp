@@ -10,8 +10,9 @@
 /// squares: with P(k|k) = L L^T, F L the image of L by the motion and everything else that P(k+1|k) consists
 /// of as W W^T,
 ///   V_k = (L - G_k F L)(L - G_k F L)^T + G_k W (G_k W)^T
-/// G brings back what the state after says, so that a number whose deviation is a millionth of those that the
-/// motion mixes it with is not better known of the smoothed moment than P(k+1|T) as a matrix can hold it.
+/// G brings back what the state after says. Of a direction that has less than 2e-13 of the variance of the
+/// numbers it is made of, P(k+1|k) and P(k+1|T) as matrices say nothing: nothing is brought back from there,
+/// and what the state after would have said of it is not known of the smoothed moment.
 /// (H. Rauch, F. Tung, C. Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA Journal 3,
 /// 1965; S. Sarkka, "Unscented Rauch-Tung-Striebel smoother", IEEE Trans. Automatic Control 53, 2008.)
 ///
@@ -29,6 +30,7 @@
 #include <concepts>
 #include <cstddef>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include <cairn/core/check.hpp>
@@ -73,7 +75,8 @@ void record_rows(RecordedStep<X>& step, const CovarianceOf<X>& root, Array& arra
   using S = ScalarOf<X>;
   constexpr int n = dof<X>;
   const int ns = static_cast<int>(root.rows()), rows = static_cast<int>(array.rows());
-  // [image^T L^T; rest^T 0] -> [U, (G U^T)^T; 0 *],  U^T U = P(k+1|k); a number that others fix has no pivot
+  // [image^T L^T; rest^T 0] -> [U, (G U^T)^T; 0 *],  U^T U = P(k+1|k); a number that others fix has no pivot:
+  // G would be of that matrix's rounding, and V = P - G P(k+1|k) G^T too small by what P(k+1|T) has lost
   Array triangular = array;
   Vector<n, int> pivot = Vector<n, int>::Zero(ns);
   to_echelon(triangular, ns, pivot);
@@ -121,12 +124,12 @@ template <class Filter>
     return filter;
 }
 
-/// The step that led from `before` to `predicted`.
+/// The step that led from `before` to `predicted`; nothing where `before` has no covariance. Where rounding
+/// has left `predicted` none, it gets the sum of the squares that it consists of.
 template <class Filter, class F, class U>
-[[nodiscard]] RecordedStep<typename F::State> record_step(const Filter& filter,
-                                                          const Gaussian<typename F::State>& before,
-                                                          const Gaussian<typename F::State>& predicted,
-                                                          const F& process, const U& u, double dt) {
+[[nodiscard]] std::optional<RecordedStep<typename F::State>> record_step(
+    const Filter& filter, const Gaussian<typename F::State>& before,
+    const Gaussian<typename F::State>& predicted, const F& process, const U& u, double dt) {
   using X = typename F::State;
   using S = ScalarOf<X>;
   using std::sqrt;
@@ -136,7 +139,8 @@ template <class Filter, class F, class U>
       "cairn: a Recorder of AugmentedUnscented takes linear processes: where the noise bends, what a "
       "state says of the one before is no sum of a moved and an added part");
   const PlainProcess plain(process, common_size(before.mean, before.covariance), u);
-  const CovarianceOf<X> root = semi_definite_root<n, S>(before.covariance);
+  CovarianceOf<X> root = before.covariance;
+  if (!checked_root<n, S>(before.covariance, root)) return std::nullopt;
   const int ns = static_cast<int>(root.rows());
   RecordedStep<X> step{before, predicted, root, root};
   CovarianceOf<X> q = dense_of(plain.noise(before.mean, dt));
@@ -174,6 +178,13 @@ template <class Filter, class F, class U>
       array(ns + i, j) = more * array(i, j);
       array(2 * ns + i, j) = root_q(j, i);
     }
+  if (!is_valid_covariance<n, S>(predicted.covariance))
+    for (int j = 0; j < ns; ++j)
+      for (int i = j; i < ns; ++i) {
+        S sum(0);
+        for (int k = 0; k < static_cast<int>(array.rows()); ++k) sum += array(k, i) * array(k, j);
+        step.predicted.covariance(i, j) = step.predicted.covariance(j, i) = sum;
+      }
   put_transposed(array, 0, ns, root);
   record_rows(step, root, array);
   return step;
@@ -207,14 +218,23 @@ public:
   /// Throws Error where the filter's belief is of another form than the prior, which is no covariance.
   Recorder(const Filter& filter, const Gaussian<X>& prior) : filter_(filter), belief_(Belief::from(prior)) {}
 
+  /// As the filter's own; refused as well where the belief before has no covariance, which a filter may not
+  /// see before an update. One that rounding has left indefinite here is made of squares.
   template <class F, class U = typename F::Control>
     requires(ProcessModel<F> || detail::explain_process<F>)
   Status predict(const F& process, double dt, const U& control = detail::no_control<U>()) {
     const Belief before = belief_;
     const Status status = filter_.predict(belief_, process, dt, control);
-    if (status == Status::accepted)
-      steps_.push_back(detail::record_step(detail::predicting_filter(filter_), before.gaussian(),
-                                           belief_.gaussian(), process, control, dt));
+    if (status != Status::accepted) return status;
+    const Gaussian<X> predicted = belief_.gaussian();
+    auto step = detail::record_step(detail::predicting_filter(filter_), before.gaussian(), predicted, process,
+                                    control, dt);
+    if (!step) {
+      belief_ = before;
+      return Status::not_positive_definite;
+    }
+    if (step->predicted.covariance != predicted.covariance) belief_ = Belief::from(step->predicted);
+    steps_.push_back(std::move(*step));
     return status;
   }
 
