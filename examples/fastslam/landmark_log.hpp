@@ -62,8 +62,9 @@ struct LandmarkLog {
 };
 
 /// One robot of a folder of the UTIAS set (K. Leung et al., IJRR 30, 2011). Other robots and unknown bar
-/// codes that it saw are left out. How long after odometry the robot moves is found by the bar codes. Throws
-/// cairn::Error naming file and line.
+/// codes that it saw are left out. How long after odometry the robot moves is found by the bar codes. Lines
+/// whose times go back are taken in the order of their times; a robot that nobody watched has no truth: notes
+/// say so. Throws cairn::Error naming file and line.
 [[nodiscard]] LandmarkLog read_mrclam(const std::filesystem::path& folder, int robot);
 
 /// A graph of ODOMETRY and LANDMARK lines, as Victoria Park's is published (J. Guivant, E. Nebot, T-RA 17,

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <initializer_list>
+#include <numeric>
 #include <set>
 #include <string>
 #include <utility>
@@ -26,9 +27,24 @@ using cairn::Vector;
 constexpr std::size_t most_columns = 5;
 using Row = std::vector<double>;
 
-/// What a file's first columns are: times that do not fall, the numbers of subjects or bar codes (whole,
-/// below 2^24), any other numbers, or distances, which are above zero.
+/// What a file's first columns are: times, the numbers of subjects or bar codes (whole, below 2^24), any
+/// other numbers, or distances, which are above zero.
 enum class Column { time, identity, number, distance };
+
+/// Puts rows in the order of their times, those of one time as they stood. Returns how many were before an
+/// earlier one: the ninth set's odometry begins with a line that is a tenth of a second late.
+std::size_t put_in_order(std::vector<Row>& rows) {
+  std::size_t late = 0;
+  for (std::size_t i = 1; i < rows.size(); ++i) late += rows[i][0] < rows[i - 1][0];
+  if (late == 0) return 0;
+  std::vector<std::size_t> order(rows.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(order, {}, [&](std::size_t i) { return std::pair(rows[i][0], i); });
+  std::vector<Row> sorted;
+  for (const std::size_t i : order) sorted.push_back(std::move(rows[i]));
+  rows = std::move(sorted);
+  return late;
+}
 
 /// Rows of the first numbers of each line.
 std::vector<Row> read_rows(const std::filesystem::path& path, std::initializer_list<Column> columns) {
@@ -41,7 +57,6 @@ std::vector<Row> read_rows(const std::filesystem::path& path, std::initializer_l
     for (std::size_t i = 0; i < columns.size(); ++i) {
       const double n = numbers[i];
       const Column kind = columns.begin()[i];
-      if (kind == Column::time && !rows.empty() && n < rows.back()[i]) lines.fail("times that do not fall");
       if (kind == Column::identity && !(n >= 0 && n < Map::most_identity && n == std::floor(n)))
         lines.fail("a whole number from 0 to below 2^24 in column " + std::to_string(i + 1));
       if (kind == Column::distance && !(n > 0)) lines.fail("a distance above zero");
@@ -54,18 +69,32 @@ std::vector<Row> read_rows(const std::filesystem::path& path, std::initializer_l
 /// Of one robot's files and those of its set.
 struct Files {
   using enum Column;
+  std::vector<std::string> notes;
   std::vector<Row> odometry, sightings, truth;
   std::map<int, std::uint32_t> subject_of;  // by bar code
   std::map<std::uint32_t, Vector<2>> landmarks;
 
   Files(const std::filesystem::path& folder, const std::string& robot)
-      : odometry(read_rows(folder / (robot + "_Odometry.dat"), {time, number, number})),
-        sightings(read_rows(folder / (robot + "_Measurement.dat"), {time, identity, distance, number})),
-        truth(read_rows(folder / (robot + "_Groundtruth.dat"), {time, number, number, number})) {
+      : odometry(read_timed(folder / (robot + "_Odometry.dat"), {time, number, number})),
+        sightings(read_timed(folder / (robot + "_Measurement.dat"), {time, identity, distance, number})) {
+    const std::filesystem::path watched = folder / (robot + "_Groundtruth.dat");
+    if (std::filesystem::exists(watched))
+      truth = read_timed(watched, {time, number, number, number});
+    else
+      notes.push_back("no " + watched.filename().string() + ": nobody knows how wrong the path is");
     for (const Row& r : read_rows(folder / "Barcodes.dat", {identity, identity}))
       subject_of[static_cast<int>(r[1])] = static_cast<std::uint32_t>(r[0]);
     for (const Row& r : read_rows(folder / "Landmark_Groundtruth.dat", {identity, number, number}))
       landmarks[static_cast<std::uint32_t>(r[0])] = Vector<2>(r[1], r[2]);
+  }
+
+private:
+  std::vector<Row> read_timed(const std::filesystem::path& path, std::initializer_list<Column> columns) {
+    std::vector<Row> rows = read_rows(path, columns);
+    if (const std::size_t late = put_in_order(rows); late > 0)
+      notes.push_back(path.filename().string() + ": the time goes back " + std::to_string(late) +
+                      (late == 1 ? " time" : " times") + ", lines are taken in its order");
+    return rows;
   }
 };
 
@@ -185,6 +214,7 @@ LandmarkLog read_mrclam(const std::filesystem::path& folder, int robot) {
       // A bar code faces one way, and what the camera does not read says nothing.
       .sensor = {.range_sigma = 0.5, .bearing_sigma = 0.05, .farthest = 8, .half_view = 0.5, .detection = 0},
       .landmarks = files.landmarks,
+      .notes = files.notes,
   };
   for (const Row& r : files.truth) log.truth.push_back({r[0], {r[1], r[2], r[3]}});
   for (const auto& [time, pose] : log.truth)  // where it was when odometry began
