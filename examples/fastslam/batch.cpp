@@ -33,6 +33,17 @@ std::pair<Vector<2>, Matrix<2>> error_of(const PointSensor& sensor, const SE2& x
   return {-cairn::local(sensor.predict(x, m), sighting.z), sensor.noise(x, sensor.initialise(x, sighting.z))};
 }
 
+/// Where a sighting is linearised: at the landmark, but no nearer than half of the distance that was
+/// measured. A code that was read wrongly can have put its landmark where the robot stood, and the bearing's
+/// derivative there, 1 / distance, would leave no digits for anything else.
+Vector<2> linearised_at(const PointSensor& sensor, const SE2& x, const Vector<2>& m,
+                        const Map::Sighting& sighting) {
+  const Vector<2> measured = sensor.initialise(x, sighting.z) - x.translation(), to = m - x.translation();
+  const double least = 0.5 * measured.norm(), distance = to.norm();
+  if (distance >= least) return m;
+  return x.translation() + (distance > 0 ? Vector<2>(least / distance * to) : Vector<2>(0.5 * measured));
+}
+
 struct Estimate {
   std::vector<SE2> poses;
   std::map<std::uint32_t, Vector<2>> landmarks;
@@ -99,8 +110,9 @@ private:
     const SE2& x = at.poses[k];
     const Vector<2>& m = at.landmarks.at(*sighting.identity);
     const auto [e, noise] = error_of(log_.sensor, x, m, sighting);
-    add<2, 3, 2>(to, e, noise, 3 * static_cast<int>(k), log_.sensor.state_jacobian(x, m),
-                 row_of_.at(*sighting.identity), log_.sensor.part_jacobian(x, m));
+    const Vector<2> at_least = linearised_at(log_.sensor, x, m, sighting);
+    add<2, 3, 2>(to, e, noise, 3 * static_cast<int>(k), log_.sensor.state_jacobian(x, at_least),
+                 row_of_.at(*sighting.identity), log_.sensor.part_jacobian(x, at_least));
   }
 
   const LandmarkLog& log_;

@@ -330,6 +330,25 @@ TEST_SUITE("fastslam/slam") {
     CHECK(run(log, {.particles = 3}).steps.size() == 1);
   }
 
+  TEST_CASE("fastslam: a landmark that codes read wrongly have put on the robot leaves the log its numbers") {
+    // As set 2's robots 2 and 3 and set 9's robot 1 have it, where nothing is left of the poses' information.
+    LandmarkLog log{.sensor = {.range_sigma = 0.5, .bearing_sigma = 0.05}};
+    const cairn::Matrix<3> noise = Vector<3>(1e-6, 1e-6, 1e-6).asDiagonal();
+    std::vector<SE2> start;
+    for (int k = 0; k < 8; ++k) {
+      Frame& frame = log.frames.emplace_back();
+      frame.time = k;
+      frame.moved = {SE2(cairn::SO2(), Vector<2>(0.001, 0)), noise};
+      frame.seen.push_back({cairn::RangeBearing::measurement(1, k % 2 == 0 ? 1.5 : -1.6), 6});
+      frame.seen.push_back({cairn::RangeBearing::measurement(2, 0.3), 7});
+      start.emplace_back(cairn::SO2(), Vector<2>(0.001 * (k + 1), 0));
+    }
+    BatchOptimum optimum = batch_optimum(log, start);
+    optimum.landmarks.at(6) = optimum.poses[3].translation() + Vector<2>(0, 1e-11);
+    const PathDensity density(log, optimum);
+    CHECK(std::isfinite(density.log_density(optimum.poses)));
+  }
+
   TEST_CASE(
       "fastslam: lines that go back in time are put in order, a robot that nobody watched has no truth") {
     const cairn_test::Folder folder;
