@@ -8,6 +8,8 @@
 #include <ctime>
 #include <memory>
 #include <numeric>
+#include <optional>
+#include <tuple>
 #include <utility>
 
 #include <cairn/core/check.hpp>
@@ -17,6 +19,7 @@
 #include <cairn/filter/conditional.hpp>
 
 #include "batch.hpp"
+#include "naming.hpp"
 
 namespace fastslam {
 
@@ -44,36 +47,11 @@ std::vector<SE2> means_of(const Belief& belief, std::size_t particle) {
   return poses;
 }
 
-/// Which landmarks the sightings along a path are of: by their names, or the likeliest at each pose in turn.
-/// Names that `believed` has lost are of nothing.
-std::vector<cairn::Association> associations_along(const LandmarkLog& log, const LandmarkLog& believed,
-                                                   const std::vector<SE2>& poses, Map map) {
-  std::vector<cairn::Association> all;
-  for (std::size_t k = 0; k < poses.size(); ++k) {
-    const auto& seen = log.frames[k].seen;
-    all.push_back(map.likeliest(map.candidates({poses[k], Matrix<3>::Zero()}, seen)).choice);
-    for (std::size_t i = 0; i < seen.size(); ++i)
-      if (seen[i].identity && !believed.frames[k].seen[i].identity) all.back()[i] = cairn::no_landmark;
-    map.insert(poses[k], seen, all.back());
-  }
-  return all;
-}
-
-/// Names the sightings of the log's first frames by these associations, as a map numbers its landmarks.
-LandmarkLog named(const LandmarkLog& log, const std::vector<cairn::Association>& associations) {
-  LandmarkLog part{.name = log.name, .sensor = log.sensor};
-  std::uint32_t numbers = 0;
-  for (std::size_t k = 0; k < associations.size(); ++k) {
-    Frame& frame = part.frames.emplace_back(log.frames[k]);
-    for (std::size_t i = 0; i < frame.seen.size(); ++i) {
-      auto& identity = frame.seen[i].identity;
-      const std::uint32_t n = associations[k][i];
-      if (n == cairn::no_landmark) identity.reset();
-      if (identity || n == cairn::no_landmark) continue;
-      identity = n == cairn::new_landmark ? numbers++ : n;
-    }
-  }
-  return part;
+bool has_identities(const LandmarkLog& log) {
+  for (const Frame& frame : log.frames)
+    for (const auto& sighting : frame.seen)
+      if (sighting.identity) return true;
+  return false;
 }
 
 /// Whether all sightings of the first frames have names that are believed: no path then says otherwise.
@@ -245,6 +223,7 @@ private:
         all[i].emplace(is_named ? named_so(std::move(seen[i]), *believed, std::move(*best_of_believed))
                                 : named_so(std::move(seen[i]), start));
     });
+    if (!has_identities(log_)) mend(all);
     std::vector<double> log_evidence;
     for (const auto& names : all) log_evidence.push_back(names->log_share);
     const double total = cairn::log_sum_exp(log_evidence);
@@ -254,6 +233,56 @@ private:
       result.push_back(std::move(*names));
     }
     return result;
+  }
+  /// The nearest pairs of landmarks that were never seen at once, each said to be one.
+  static std::vector<std::vector<cairn::Association>> mergings(const Names& names) {
+    constexpr double farthest = 2;  // [m]
+    constexpr std::size_t most = 4;
+    const auto& landmarks = names.density.optimum().landmarks;
+    std::vector<std::tuple<double, std::uint32_t, std::uint32_t>> pairs;
+    for (auto b = landmarks.begin(); b != landmarks.end(); ++b)
+      for (auto a = landmarks.begin(); a != b; ++a)
+        if (const double apart = (a->second - b->second).norm(); apart < farthest)
+          pairs.emplace_back(apart, a->first, b->first);
+    std::ranges::sort(pairs);
+    std::vector<std::vector<cairn::Association>> all;
+    for (const auto& [apart, a, b] : pairs)
+      if (all.size() < most)
+        if (auto one = merged(names.associations, a, b)) all.push_back(std::move(*one));
+    return all;
+  }
+  /// Adds better names than the best of all, while there are any: other readings of the sightings after gaps,
+  /// and landmarks that were begun twice made one. Much better ones: taken for every nat, UTIAS' ranges,
+  /// which err together, make twenty landmarks of fifteen.
+  void mend(std::vector<std::optional<Names>>& all) const {
+    constexpr int most_rounds = 8;
+    constexpr double margin = 10;
+    const auto log_share = [](const std::optional<Names>& names) { return names->log_share; };
+    for (int round = 0; round < most_rounds; ++round) {
+      const Names& best = **std::ranges::max_element(all, {}, log_share);
+      const std::vector<SE2>& path = best.density.optimum().poses;
+      auto readings = rereadings(log_, path, empty_, options_.threads, 8);
+      for (auto& associations : mergings(best)) readings.push_back({path, std::move(associations), empty_});
+      std::erase_if(readings, [&](const Reading& r) { return r.associations == best.associations; });
+      if (readings.empty()) return;
+      std::vector<std::optional<Names>> mended(readings.size());
+      cairn::parallel_for(readings.size(), options_.threads, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t i = begin; i < end; ++i)
+          mended[i].emplace(settled(named_so(std::move(readings[i].associations), readings[i].poses)));
+      });
+      auto& better = *std::ranges::max_element(mended, {}, log_share);
+      if (!(better->log_share > best.log_share + margin)) return;
+      all.push_back(std::move(better));
+    }
+  }
+  /// The same, or what is likeliest along their optimum where that is better.
+  Names settled(Names names) const {
+    const std::vector<SE2> path = names.density.optimum().poses;
+    auto along = associations_along(log_, log_, path, empty_);
+    if (along == names.associations) return names;
+    Names other = named_so(std::move(along), path);
+    if (other.log_share > names.log_share) return other;
+    return names;
   }
   /// For each path, by their shares.
   std::vector<std::size_t> drawn_names() {
@@ -520,13 +549,6 @@ void measure_gps(Results& r, const LandmarkLog& log) {
   }
   r.gps_median = distance[order[order.size() / 2]];
   for (const Vector<2>& fix : fixes) r.gps.emplace_back(fit * fix);
-}
-
-bool has_identities(const LandmarkLog& log) {
-  for (const Frame& frame : log.frames)
-    for (const auto& sighting : frame.seen)
-      if (sighting.identity) return true;
-  return false;
 }
 
 }  // namespace

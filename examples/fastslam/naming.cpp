@@ -1,0 +1,201 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "naming.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <utility>
+
+#include <cairn/core/parallel.hpp>
+#include <cairn/core/statistics.hpp>
+#include <cairn/filter/gaussian.hpp>
+
+namespace fastslam {
+
+namespace {
+
+using cairn::Matrix;
+using cairn::SE2;
+using cairn::Vector;
+
+/// The next frame of a reading's path, its sightings of what is likeliest.
+void go_on(Reading& reading, const LandmarkLog& log, const SE2& pose) {
+  const Frame& frame = log.frames[reading.poses.size()];
+  const SE2 before = reading.poses.empty() ? SE2() : reading.poses.back();
+  const cairn::Gaussian<SE2> motion{before * frame.moved.mean, frame.moved.covariance};
+  auto association =
+      reading.map.likeliest(reading.map.candidates({pose, Matrix<3>::Zero()}, frame.seen)).choice;
+  reading.log_density +=
+      cairn::log_density(motion, pose) + reading.map.log_likelihood(pose, frame.seen, association);
+  reading.map.insert(pose, frame.seen, association);
+  reading.poses.push_back(pose);
+  reading.associations.push_back(std::move(association));
+}
+
+/// A frame before which the motion is so uncertain that a landmark can be mistaken for its neighbour.
+struct Gap {
+  std::size_t frame = 0;
+  double metres = 0, radians = 0;  ///< deviations
+};
+
+/// The most uncertain ones, by their frames.
+std::vector<Gap> widest_gaps(const LandmarkLog& log, std::size_t frames) {
+  constexpr std::size_t most = 12;
+  constexpr double least = 0.2;
+  std::vector<Gap> gaps;
+  for (std::size_t k = 1; k < frames; ++k) {
+    const Matrix<3>& covariance = log.frames[k].moved.covariance;
+    const double metres = std::sqrt(covariance(0, 0) + covariance(1, 1));
+    if (metres > least) gaps.push_back({k, metres, std::sqrt(covariance(2, 2))});
+  }
+  std::ranges::sort(gaps, std::greater<>{}, [](const Gap& g) { return std::pair(g.metres, g.frame); });
+  if (gaps.size() > most) gaps.resize(most);
+  std::ranges::sort(gaps, {}, &Gap::frame);
+  return gaps;
+}
+
+/// Where the first things, a metre and more from each other, were seen from a frame of the path on.
+std::vector<Vector<2>> first_seen(const LandmarkLog& log, const std::vector<SE2>& poses, std::size_t from) {
+  constexpr std::size_t most = 3;
+  std::vector<Vector<2>> places;
+  for (std::size_t k = from; k < poses.size() && places.size() < most; ++k)
+    for (const auto& sighting : log.frames[k].seen) {
+      const Vector<2> place = log.sensor.initialise(poses[k], sighting.z);
+      if (std::ranges::all_of(places, [&](const auto& other) { return (other - place).norm() > 1; }))
+        places.push_back(place);
+    }
+  return places;
+}
+
+/// How the rest of the path may be moved to take what was seen for landmarks of the map: one thing for one,
+/// without a turn, or two for two that are as far apart.
+std::vector<SE2> moves_onto(const Map& map, const std::vector<Vector<2>>& places, const Gap& gap) {
+  std::vector<Vector<2>> landmarks;
+  map.for_each([&](std::uint32_t, const auto& landmark) { landmarks.push_back(landmark.belief.mean); });
+  std::vector<SE2> moves;
+  const auto add = [&](const SE2& move) {
+    const double by = (move * places[0] - places[0]).norm(), turn = std::abs(move.rotation().angle());
+    if (by > 3 * gap.metres + 2 || turn > 3 * gap.radians || (by < 1 && turn < 0.2)) return;
+    const auto differs = [&](const SE2& other) {
+      return (other * places[0] - move * places[0]).norm() > 0.5 ||
+             std::abs((other.rotation().inverse() * move.rotation()).angle()) > 0.15;
+    };
+    if (std::ranges::all_of(moves, differs)) moves.push_back(move);
+  };
+  for (const Vector<2>& m : landmarks)
+    for (const Vector<2>& place : places) add(SE2(cairn::SO2(), m - place));
+  for (std::size_t i = 0; i < places.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      for (const Vector<2>& m : landmarks)
+        for (const Vector<2>& n : landmarks) {
+          const Vector<2> seen = places[i] - places[j], is = m - n;
+          if (std::abs(seen.norm() - is.norm()) > 0.7) continue;
+          const cairn::SO2 turn(std::atan2(is(1), is(0)) - std::atan2(seen(1), seen(0)));
+          add({turn, Vector<2>(0.5 * (m + n) - turn * Vector<2>(0.5 * (places[i] + places[j])))});
+        }
+  return moves;
+}
+
+}  // namespace
+
+std::vector<cairn::Association> associations_along(const LandmarkLog& log, const LandmarkLog& believed,
+                                                   const std::vector<SE2>& poses, Map map) {
+  std::vector<cairn::Association> all;
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    const auto& seen = log.frames[k].seen;
+    all.push_back(map.likeliest(map.candidates({poses[k], Matrix<3>::Zero()}, seen)).choice);
+    for (std::size_t i = 0; i < seen.size(); ++i)
+      if (seen[i].identity && !believed.frames[k].seen[i].identity) all.back()[i] = cairn::no_landmark;
+    map.insert(poses[k], seen, all.back());
+  }
+  return all;
+}
+
+LandmarkLog named(const LandmarkLog& log, const std::vector<cairn::Association>& associations) {
+  LandmarkLog part{.name = log.name, .sensor = log.sensor};
+  std::uint32_t numbers = 0;
+  for (std::size_t k = 0; k < associations.size(); ++k) {
+    Frame& frame = part.frames.emplace_back(log.frames[k]);
+    for (std::size_t i = 0; i < frame.seen.size(); ++i) {
+      auto& identity = frame.seen[i].identity;
+      const std::uint32_t n = associations[k][i];
+      if (n == cairn::no_landmark) identity.reset();
+      if (identity || n == cairn::no_landmark) continue;
+      identity = n == cairn::new_landmark ? numbers++ : n;
+    }
+  }
+  return part;
+}
+
+std::optional<std::vector<cairn::Association>> merged(std::vector<cairn::Association> associations,
+                                                      std::uint32_t a, std::uint32_t b) {
+  constexpr std::uint32_t unnumbered = cairn::no_landmark;
+  std::vector<std::uint32_t> number_of;  // by the number before
+  std::uint32_t begun = 0;
+  for (cairn::Association& frame : associations) {
+    bool saw_a = false, saw_b = false;
+    for (std::uint32_t& n : frame) {
+      if (n == cairn::no_landmark) continue;
+      if (n == cairn::new_landmark) {
+        n = static_cast<std::uint32_t>(number_of.size());
+        number_of.push_back(unnumbered);
+      }
+      saw_a = saw_a || n == a;
+      saw_b = saw_b || n == b;
+      const std::uint32_t is = n == b ? a : n;
+      if (is >= number_of.size()) return std::nullopt;
+      std::uint32_t& number = number_of[is];
+      const bool is_new = number == unnumbered;
+      if (is_new) number = begun++;
+      n = is_new ? cairn::new_landmark : number;
+    }
+    if (saw_a && saw_b) return std::nullopt;
+  }
+  return associations;
+}
+
+std::vector<Reading> rereadings(const LandmarkLog& log, const std::vector<SE2>& poses, const Map& empty,
+                                unsigned threads, std::size_t most) {
+  struct Other {
+    Reading begun;  // until the gap
+    SE2 move;
+  };
+  std::vector<Other> others;
+  Reading along{.poses = {}, .associations = {}, .map = empty};
+  std::vector<double> log_densities;  // along the path as it stands, after each frame
+  const auto stand_still = [&](std::size_t until) {
+    while (along.poses.size() < until) {
+      go_on(along, log, poses[along.poses.size()]);
+      log_densities.push_back(along.log_density);
+    }
+  };
+  for (const Gap& gap : widest_gaps(log, poses.size())) {
+    stand_still(gap.frame);
+    const std::vector<Vector<2>> places = first_seen(log, poses, gap.frame);
+    if (places.empty()) continue;
+    for (const SE2& move : moves_onto(along.map, places, gap)) others.push_back({along, move});
+  }
+  stand_still(poses.size());
+  constexpr double hopeless = 60;  // so far behind the path as it stands, a reading is given up
+  cairn::parallel_for(others.size(), threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      Reading& reading = others[i].begun;
+      while (reading.poses.size() < poses.size()) {
+        const std::size_t k = reading.poses.size();
+        go_on(reading, log, others[i].move * poses[k]);
+        if (reading.log_density < log_densities[k] - hopeless) break;
+      }
+    }
+  });
+  std::erase_if(others, [&](const Other& o) { return o.begun.poses.size() < poses.size(); });
+  std::vector<std::pair<double, std::size_t>> best;
+  for (std::size_t i = 0; i < others.size(); ++i) best.emplace_back(-others[i].begun.log_density, i);
+  std::ranges::sort(best);
+  std::vector<Reading> result;
+  for (std::size_t i = 0; i < std::min(most, best.size()); ++i)
+    result.push_back(std::move(others[best[i].second].begun));
+  return result;
+}
+
+}  // namespace fastslam

@@ -1,0 +1,52 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+//
+/// @file
+/// Which landmarks the sightings along a path are of, and what else they may be of.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include <cairn/manifold/se2.hpp>
+#include <cairn/slam/landmark_map.hpp>
+
+#include "landmark_log.hpp"
+
+namespace fastslam {
+
+/// A path with what its sightings are of, its map, and what the particles' own model says of it, log p(x_1:t,
+/// n_1:t, z_1:t).
+struct Reading {
+  std::vector<cairn::SE2> poses;
+  std::vector<cairn::Association> associations;
+  Map map;
+  double log_density = 0;
+};
+
+/// Which landmarks the sightings along a path are of: by their names, or the likeliest at each pose in turn.
+/// Names that `believed` has lost are of nothing. The map is empty.
+[[nodiscard]] std::vector<cairn::Association> associations_along(const LandmarkLog& log,
+                                                                 const LandmarkLog& believed,
+                                                                 const std::vector<cairn::SE2>& poses,
+                                                                 Map map);
+
+/// Names the sightings of the log's first frames by these associations, as a map numbers its landmarks.
+[[nodiscard]] LandmarkLog named(const LandmarkLog& log, const std::vector<cairn::Association>& associations);
+
+/// The associations with all that was of landmark b said to be of landmark a, numbered as a map would;
+/// nothing where both were seen at once.
+[[nodiscard]] std::optional<std::vector<cairn::Association>> merged(
+    std::vector<cairn::Association> associations, std::uint32_t a, std::uint32_t b);
+
+/// After each of the widest gaps, by how uncertain the motion over them is: the rest of the path moved so
+/// that one or two of the first things that were seen then are landmarks that were seen before, any that the
+/// motion allows. The `most` likeliest, each not optimised. Particles come back from a gap where their own
+/// draws put them, and once all of them have taken one post for its neighbour, none will ever tell. O(gaps
+/// landmarks frames log landmarks). The same for any number of threads.
+[[nodiscard]] std::vector<Reading> rereadings(const LandmarkLog& log, const std::vector<cairn::SE2>& poses,
+                                              const Map& empty, unsigned threads, std::size_t most);
+
+}  // namespace fastslam
