@@ -55,6 +55,9 @@ TEST_SUITE("derivatives") {
     CHECK(cairn::wrapped(3.0) == 3.0);
     CHECK(cairn::wrapped(-M_PI - 0.1) == doctest::Approx(M_PI - 0.1));
     CHECK(std::abs(cairn::wrapped(1e4 * M_PI + 0.25) - 0.25) < 1e-11);
+    for (const double far : {-5.234605904457936e16, 1e17, -3e200, 1.7e308})  // an angle all the same
+      CHECK(std::abs(cairn::wrapped(far)) <= M_PI);
+    CHECK(std::abs(cairn::wrapped(3e30F)) <= static_cast<float>(M_PI));
     CHECK(cairn::local(SO2(3.1), SO2(-3.1))(0) == doctest::Approx(2 * M_PI - 6.2));
     CHECK((SO2(0.3) * Vector<2>(1, 0) - Vector<2>(std::cos(0.3), std::sin(0.3))).norm() < 1e-16);
   }

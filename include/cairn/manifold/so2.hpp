@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cmath>
+#include <concepts>
 
 #include <cairn/core/linalg.hpp>
 #include <cairn/manifold/manifold.hpp>
@@ -29,7 +30,10 @@ template <class S>
   if (a >= -detail::pi<S> && a <= detail::pi<S>) [[likely]]
     return a;
   const S turns = floor(a / (S(2) * detail::pi<S>)+S(0.5));
-  return a - turns * (S(2) * detail::pi<S>);
+  const S rest = a - turns * (S(2) * detail::pi<S>);
+  if constexpr (std::floating_point<S>)  // of so many turns that none of the digits of the rest are right
+    if (!(rest >= -detail::pi<S> && rest <= detail::pi<S>)) return std::remainder(a, S(2) * detail::pi<S>);
+  return rest;
 }
 
 /// A rotation of the plane. S is float, double or a scalar with arithmetic, order, floor, sin and cos.

@@ -164,7 +164,8 @@ public:
     if (found == nullptr) return std::nullopt;
     return Gaussian<Vector<3>>{found->x, found->S};
   }
-  /// The same with the keyframes' uncertainty: how well the landmark is known in the world.
+  /// The same with the keyframes' uncertainty: how well the landmark is known in the world. Nothing where
+  /// that is more than numbers hold, which a file's numbers can make it.
   [[nodiscard]] std::optional<Gaussian<Vector<3>>> landmark_in_world(std::uint32_t id) {
     const detail::KeyframeLandmark* const found = fresh(id);
     if (found == nullptr) return std::nullopt;
@@ -179,7 +180,9 @@ public:
         for (int c = 0; c < 3; ++c) put(both, 0, c, moved_with_world(found->x, &turned(0, c)));
         P += product_transposed(product(found->F[a], transposed(both)), found->F[b]);
       }
-    return Gaussian<Vector<3>>{found->x, pose_factor_ * symmetrised(P)};
+    const Matrix<3> covariance = pose_factor_ * symmetrised(P);
+    if (!all_finite(found->x) || !all_finite(covariance)) return std::nullopt;
+    return Gaussian<Vector<3>>{found->x, covariance};
   }
   /// All that a landmark follows from, by keyframes: with keyframe_pose(), the data of the joint least
   /// squares problem whose solution the map approximates. Empty for a landmark that is not there.
