@@ -334,36 +334,6 @@ TEST_SUITE("stereo_pose") {
     place([](double i) { return Vector<3>(0.1 + 0.01 * i, 0.2, 4 + 0.03 * i); });
   }
 
-  // Exactly known landmarks on a line are refused because samples of them are; these pass for triangles.
-  TEST_CASE("estimate_stereo_pose: the landmarks' own noise beside a line is no lever, and a prior is one") {
-    const auto seed = cairn_test::seed();
-    CAPTURE(seed);
-    cairn::Random random(seed);
-    const StereoRig rig = cairn_test::rectified_rig();
-    for (const double sigma : {0.02, 0.3})
-      for (int run = 0; run < 10; ++run) {
-        const SE3 T = random_pose(random);
-        const Vector<3> start(0.4 * random.uniform() - 0.2, 0.4 * random.uniform() - 0.2, 5);
-        const Vector<3> along = Vector<3>(random.uniform() - 0.5, random.uniform() - 0.5, 1).normalized();
-        std::vector<StereoMatch> matches(150);
-        for (StereoMatch& m : matches) {
-          const Vector<3> p = start + 3 * (random.uniform() - 0.5) * along;
-          const Vector<4> pixels = *rig.project(p);
-          m.landmark = T * p + sigma * Vector<3>(random.normal(), random.normal(), random.normal());
-          m.covariance = sigma * sigma * Matrix<3>::Identity();
-          m.left = pixels.head<2>() + 0.5 * Vector<2>(random.normal(), random.normal());
-          m.right = pixels.tail<2>() + 0.5 * Vector<2>(random.normal(), random.normal());
-        }
-        CHECK_FALSE(estimate_stereo_pose(rig, matches).good());
-        CHECK_FALSE(cairn::refine_stereo_pose(rig, matches, T).good());
-        const StereoPose known = cairn::refine_stereo_pose(
-            rig, matches, T, {}, PosePrior{T, 1e6 * Matrix<6>::Identity()});  // a milliradian
-        CHECK(known.good());
-        const Vector<6> error = cairn::local(T, known.T_world_camera);
-        CHECK(error.dot(known.information * error) < cairn::chi_square_quantile(1 - 1e-6, 6));
-      }
-  }
-
   TEST_CASE("estimate_stereo_pose: matches that are all wrong give no consensus") {
     const auto seed = cairn_test::seed();
     CAPTURE(seed);

@@ -10,8 +10,10 @@
 ///
 /// The lever p is where both sightings together put the point, p = T^-1 y - R^T C_y R C^-1 r: with T^-1 y in
 /// its place the step would leave out that C turns with R. Its noise, of covariance C_p = C_x C^-1 R^T C_y R,
-/// is lever too, and what it adds to the information of the rotation is taken off
-/// (detail/pose_equations.hpp).
+/// is lever too, so that J^T C^-1 J holds more of the rotation than there is to know,
+///   E[skew(n)^T W skew(n)] = W S + S W - tr(W) S - tr(S) W + (tr(W) tr(S) - tr(W S)) I,   W = C^-1, S = C_p
+///   (2)
+/// which is taken off; a direction that has less than four times as much beside it is undetermined.
 #pragma once
 
 #include <algorithm>
@@ -143,10 +145,17 @@ public:
 
   /// Of the pairs that agree, without what is noise; nothing where that leaves a direction undetermined.
   [[nodiscard]] std::optional<Matrix<6>> information(const SE3& motion) const {
-    const auto seen =
-        without_lever_noise(linearise(motion, gate_, RobustLoss::none).information, lever_noise(motion));
-    if (!seen) return std::nullopt;
-    return *seen * robust_efficiency(options_.loss, options_.loss_scale, options_.gate_probability, gate_, 3);
+    constexpr double least_signal = 4;  // levers twice as long as their deviation
+    const Matrix<6> information = linearise(motion, gate_, RobustLoss::none).information;
+    const Matrix<3> noise = lever_noise(motion);
+    Matrix<6> seen = information, doubtful = information;
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) {
+        seen(3 + i, 3 + j) -= noise(i, j);
+        doubtful(3 + i, 3 + j) -= (1 + least_signal) * noise(i, j);
+      }
+    if (!factor_information(doubtful)) return std::nullopt;
+    return seen * robust_efficiency(options_.loss, options_.loss_scale, options_.gate_probability, gate_, 3);
   }
 
 private:
@@ -212,20 +221,21 @@ private:
     return e;
   }
 
-  /// What the noise of the levers adds to the information of the rotation, of the pairs that agree.
+  /// What the noise of the levers adds to the information of the rotation, of the pairs that agree: (2).
   [[nodiscard]] Matrix<3> lever_noise(const SE3& motion) const {
     const Frame frame(motion);
-    double sum[6] = {};
+    Matrix<3> sum = Matrix<3>::Zero();
     for (const PointMatch& pair : pairs_) {
       const Residual residual(pair, frame);
       if (!(residual.chi_squared() < gate_)) continue;
       const Matrix<3> w = residual.factor.inverse();
       const Matrix<3> s = symmetrised(product(pair.source_covariance, product(w, residual.of_target)));
-      const double W[6] = {w(0, 0), w(0, 1), w(0, 2), w(1, 1), w(1, 2), w(2, 2)};
-      const double S[6] = {s(0, 0), s(0, 1), s(0, 2), s(1, 1), s(1, 2), s(2, 2)};
-      add_lever_noise(W, S, sum);
+      const Matrix<3> both = product(w, s);
+      const double size_w = w.trace(), size_s = s.trace();
+      sum += both + both.transpose() - size_w * s - size_s * w;
+      for (int i = 0; i < 3; ++i) sum(i, i) += size_w * size_s - both.trace();
     }
-    return Matrix<3>{{sum[0], sum[1], sum[2]}, {sum[1], sum[3], sum[4]}, {sum[2], sum[4], sum[5]}};
+    return sum;
   }
 
   std::span<const PointMatch> pairs_;

@@ -10,9 +10,9 @@
 /// whitened with pixel noise and landmark covariance (stereo_residual.hpp): points at 5 m and at 50 m then
 /// weigh what they are worth, which distances in space cannot express.
 ///
-/// Covariance: inverse of the inliers' information, corrected for what the loss and the gate cost and for the
-/// noise of the landmarks, which are levers: what their covariance puts beside a line that all are on does
-/// not know how the camera is turned about it, and the pose is degenerate.
+/// Covariance: inverse of the inliers' information, corrected for what the loss and the gate cost. Landmarks
+/// are levers as they stand: where all are on a line, what their own covariance puts beside it counts as if
+/// it were known, and the pose is called good (robust_alignment.hpp takes that off).
 /// Cost: O(matches) for each of some 10 to 70 samples.
 #pragma once
 
@@ -100,9 +100,8 @@ inline void finish_stereo_pose(const StereoPoseProblem& problem, SE3 pose, const
     if (!length) return;
     if (*length < 1e-5) break;  // 0.003 standard deviations, and the next step would be far shorter
   }
-  const auto information = problem.information(pose);
-  if (!information) return;
-  const auto factor = factor_information(*information);
+  const Matrix<6> information = problem.information(pose);
+  const auto factor = factor_information(information);
   if (!factor) return;
   const RansacScore score = problem.score(pose, std::numeric_limits<double>::infinity());
   result.cost = score.cost;
@@ -112,7 +111,7 @@ inline void finish_stereo_pose(const StereoPoseProblem& problem, SE3 pose, const
   }
   result.status = StereoPoseStatus::good;
   result.T_world_camera = pose;
-  result.information = *information;
+  result.information = information;
   result.covariance = factor->inverse();
   result.inlier_count = score.inliers;
   problem.inliers(pose, result.inliers);

@@ -6,10 +6,6 @@
 ///
 /// A pose error d = (translation, rotation) is a right step, T exp(d). A landmark at p in the camera frame
 /// then moves by d p / d d = [-I, skew(p)]. (1)
-///
-/// A lever that is truth + n, n of covariance C, is longer than the truth: J^T W J of its rotation holds
-///   E[skew(n)^T W skew(n)]_ij = sum e_iab e_jcd W_ac C_bd                              (2)
-/// too much, the mixed cofactors of W and C. Without it, noise beside a line would be known to turn with it.
 #pragma once
 
 #include <cstddef>
@@ -28,17 +24,6 @@ template <class Options>
 [[nodiscard]] bool enough_inliers(std::size_t inliers, std::size_t count, const Options& options) noexcept {
   return inliers >= options.min_inliers &&
          static_cast<double>(inliers) >= options.min_share * static_cast<double>(count);
-}
-
-/// Adds (2) to `sum`, all of symmetric matrices as 00 01 02 11 12 22.
-template <class S>
-[[gnu::always_inline]] inline void add_lever_noise(const S (&W)[6], const S (&C)[6], S (&sum)[6]) noexcept {
-  sum[0] += W[3] * C[5] + W[5] * C[3] - 2.0 * W[4] * C[4];
-  sum[1] += W[4] * C[2] + W[2] * C[4] - W[1] * C[5] - W[5] * C[1];
-  sum[2] += W[1] * C[4] + W[4] * C[1] - W[3] * C[2] - W[2] * C[3];
-  sum[3] += W[0] * C[5] + W[5] * C[0] - 2.0 * W[2] * C[2];
-  sum[4] += W[1] * C[2] + W[2] * C[1] - W[0] * C[4] - W[4] * C[0];
-  sum[5] += W[0] * C[3] + W[3] * C[0] - 2.0 * W[1] * C[1];
 }
 
 /// Normal equations of a pose step in world axes, a partial sum in each lane.
@@ -91,24 +76,8 @@ public:
     return g;
   }
 
-  /// Takes part in lever_noise() what the landmarks' covariances C, in world axes, put into the levers.
-  [[gnu::always_inline]] void add_noise(const StereoStatistics& s, const MatchLane (&C)[6],
-                                        const MatchLane& weight) noexcept {
-    MatchLane W[6];
-    for (int i = 0; i < 6; ++i) W[i] = weight * s.information[i];
-    add_lever_noise(W, C, noise_);
-  }
-
-  /// (2) for right steps of a pose with rotation `R_world_camera`.
-  [[nodiscard]] Matrix<3> lever_noise(const Matrix<3>& R) const noexcept {
-    Matrix<3> m;
-    for (int i = 0, k = 0; i < 3; ++i)
-      for (int j = i; j < 3; ++j, ++k) m(i, j) = m(j, i) = sum(noise_[k]);
-    return symmetrised(transposed_product(R, product(m, R)));
-  }
-
 private:
-  MatchLane translation_[6] = {}, rotation_[6] = {}, coupling_[3][3] = {}, gradient_[6] = {}, noise_[6] = {};
+  MatchLane translation_[6] = {}, rotation_[6] = {}, coupling_[3][3] = {}, gradient_[6] = {};
 };
 
 /// Cholesky factor of an information matrix; nothing where a direction is undetermined given the others.
@@ -117,22 +86,6 @@ private:
   const Cholesky<6> result(information);
   if (!(result.good() && result.least_share() > least_share)) return std::nullopt;
   return result;
-}
-
-/// `information` of a pose less the `noise` of its levers, (2) in the axes of the step; nothing where that
-/// leaves a direction undetermined: one that has less than four times as much beside the noise, by levers
-/// that are shorter than twice their deviation.
-[[nodiscard]] inline std::optional<Matrix<6>> without_lever_noise(const Matrix<6>& information,
-                                                                  const Matrix<3>& noise) {
-  constexpr double least_signal = 4;
-  Matrix<6> seen = information, doubtful = information;
-  for (int i = 0; i < 3; ++i)
-    for (int j = 0; j < 3; ++j) {
-      seen(3 + i, 3 + j) -= noise(i, j);
-      doubtful(3 + i, 3 + j) -= (1 + least_signal) * noise(i, j);
-    }
-  if (!factor_information(doubtful)) return std::nullopt;
-  return seen;
 }
 
 }}}  // namespace cairn::CAIRN_ABI::detail

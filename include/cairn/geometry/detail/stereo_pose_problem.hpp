@@ -118,19 +118,17 @@ public:
     return pose;
   }
 
-  /// Information of the pose by the matches below the gate and the prior; nothing where a direction is left
-  /// undetermined. The first part carries the efficiency of the loss and the gate, and no noise of levers.
-  [[nodiscard]] std::optional<Matrix<6>> information(const SE3& pose) const {
+  /// Information of the pose by the matches below the gate and the prior. The first part carries the
+  /// efficiency of the loss and the gate.
+  [[nodiscard]] Matrix<6> information(const SE3& pose) const {
     PoseEquations equations;
-    const StereoView view(pose, rig_);
-    with_avx2_lanes([&]() CAIRN_INLINED { judge_lanes(view, equations); });
-    const Matrix<3> R = pose.rotation().matrix();
-    const double efficiency =
+    linearise(lanes_, pose, gate_, RobustLoss::none, 1, equations);
+    Matrix<6> result =
+        equations.information(pose.rotation().matrix()) *
         robust_efficiency(options_.loss, options_.loss_scale, options_.gate_probability, gate_, dof());
-    Matrix<6> result = efficiency * equations.information(R);
     Vector<6> unused = Vector<6>::Zero();
     add_prior(pose, result, unused);
-    return without_lever_noise(result, efficiency * equations.lever_noise(R));
+    return result;
   }
 
 private:
@@ -164,17 +162,6 @@ private:
         weight[lane] = chi_squared < gate ? robust_weight(loss, loss_scale, chi_squared) : 0;
       }
       equations.add(s, weight);
-    }
-  }
-
-  [[gnu::always_inline]] void judge_lanes(const StereoView& view, PoseEquations& equations) const noexcept {
-    StereoStatistics s;
-    for (const MatchLanes& m : lanes_) {
-      if (!evaluate(m, view, gate_, s)) continue;
-      MatchLane weight;
-      for (std::size_t lane = 0; lane < match_lanes; ++lane) weight[lane] = s.chi_squared[lane] < gate_;
-      equations.add(s, weight);
-      equations.add_noise(s, m.covariance, weight);
     }
   }
 
