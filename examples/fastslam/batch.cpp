@@ -38,10 +38,11 @@ std::pair<Vector<2>, Matrix<2>> error_of(const PointSensor& sensor, const SE2& x
 /// derivative there, 1 / distance, would leave no digits for anything else.
 Vector<2> linearised_at(const PointSensor& sensor, const SE2& x, const Vector<2>& m,
                         const Map::Sighting& sighting) {
-  const Vector<2> measured = sensor.initialise(x, sighting.z) - x.translation(), to = m - x.translation();
-  const double least = 0.5 * measured.norm(), distance = to.norm();
+  const Vector<2> to = m - x.translation();
+  const double least = 0.5 * sighting.z.part<0>()(0), distance = to.norm();
   if (distance >= least) return m;
-  return x.translation() + (distance > 0 ? Vector<2>(least / distance * to) : Vector<2>(0.5 * measured));
+  if (distance > 0) return x.translation() + least / distance * to;
+  return 0.5 * (x.translation() + sensor.initialise(x, sighting.z));
 }
 
 struct Estimate {

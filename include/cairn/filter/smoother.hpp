@@ -97,13 +97,7 @@ void record_rows(RecordedStep<X>& step, const CovarianceOf<X>& root, Array& arra
       for (int j = 0; j < ns; ++j) sum -= step.gain(i, j) * array(k, j);
       left(i, k) = sum;
     }
-  step.given_after = CovarianceOf<X>::Zero(ns, ns);
-  for (int j = 0; j < ns; ++j)
-    for (int i = j; i < ns; ++i) {
-      S sum(0);
-      for (int k = 0; k < rows; ++k) sum += left(i, k) * left(j, k);
-      step.given_after(i, j) = step.given_after(j, i) = sum;
-    }
+  square(left, step.given_after);
 }
 
 /// All of one size, as those of a Recorder are.
@@ -179,12 +173,7 @@ template <class Filter, class F, class U>
       array(2 * ns + i, j) = root_q(j, i);
     }
   if (!is_valid_covariance<n, S>(predicted.covariance))
-    for (int j = 0; j < ns; ++j)
-      for (int i = j; i < ns; ++i) {
-        S sum(0);
-        for (int k = 0; k < static_cast<int>(array.rows()); ++k) sum += array(k, i) * array(k, j);
-        step.predicted.covariance(i, j) = step.predicted.covariance(j, i) = sum;
-      }
+    square(array.leftCols(ns).transpose(), step.predicted.covariance);
   put_transposed(array, 0, ns, root);
   record_rows(step, root, array);
   return step;

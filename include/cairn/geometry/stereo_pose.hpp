@@ -13,8 +13,9 @@
 /// Covariance: inverse of the inliers' information, corrected for what the loss and the gate cost. Landmarks
 /// are levers as they stand: where all are on a line, what their own covariance puts beside it counts as if
 /// it were known, and the pose is called good. Taking that off as robust_alignment.hpp does refuses poses
-/// that are right where most landmarks were seen once, by a stereo pair far away. Cost: O(matches) for each
-/// of some 10 to 70 samples.
+/// that are right where most landmarks were seen once, by a stereo pair far away.
+///
+/// Cost: O(matches) for each of some 10 to 70 samples.
 #pragma once
 
 #include <algorithm>
