@@ -62,7 +62,8 @@ struct Drive {
   std::vector<cairn::SE2> truth;  ///< of the vehicle at each scan
 };
 
-/// Throws cairn::Error where visual odometry fails.
+/// Where visual odometry does not tell a motion, the step before is made again, with a covariance that says
+/// so.
 [[nodiscard]] Drive simulated_drive(const DriveOptions& options);
 
 /// Poses by visual odometry alone, from the true start.

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <type_traits>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -13,6 +14,7 @@
 #include <cairn/core/statistics.hpp>
 #include <cairn/geometry/detail/stereo_pose_problem.hpp>
 #include <cairn/geometry/stereo_pose.hpp>
+#include <cairn/geometry/triangulation.hpp>
 #include <cairn/manifold/derivatives.hpp>
 
 #include "support/processors.hpp"
@@ -332,6 +334,131 @@ TEST_SUITE("stereo_pose") {
     };
     place([](double) { return Vector<3>(0.1, 0.2, 4); });
     place([](double i) { return Vector<3>(0.1 + 0.01 * i, 0.2, 4 + 0.03 * i); });
+  }
+
+  // Exactly known landmarks on a line are refused because samples of them are; these pass for triangles.
+  TEST_CASE("estimate_stereo_pose: the landmarks' own noise beside a line is no lever, and a prior is one") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const StereoRig rig = cairn_test::rectified_rig();
+    for (const double sigma : {0.02, 0.3})
+      for (int run = 0; run < 10; ++run) {
+        const SE3 T = random_pose(random);
+        const Vector<3> start(0.4 * random.uniform() - 0.2, 0.4 * random.uniform() - 0.2, 5);
+        const Vector<3> along = Vector<3>(random.uniform() - 0.5, random.uniform() - 0.5, 1).normalized();
+        std::vector<StereoMatch> matches(150);
+        for (StereoMatch& m : matches) {
+          const Vector<3> p = start + 3 * (random.uniform() - 0.5) * along;
+          const Vector<4> pixels = *rig.project(p);
+          m.landmark = T * p + sigma * Vector<3>(random.normal(), random.normal(), random.normal());
+          m.covariance = sigma * sigma * Matrix<3>::Identity();
+          m.left = pixels.head<2>() + 0.5 * Vector<2>(random.normal(), random.normal());
+          m.right = pixels.tail<2>() + 0.5 * Vector<2>(random.normal(), random.normal());
+        }
+        CHECK_FALSE(estimate_stereo_pose(rig, matches).good());
+        CHECK_FALSE(cairn::refine_stereo_pose(rig, matches, T).good());
+        const StereoPose known = cairn::refine_stereo_pose(
+            rig, matches, T, {}, PosePrior{T, 1e6 * Matrix<6>::Identity()});  // a milliradian
+        CHECK(known.good());
+        const Vector<6> error = cairn::local(T, known.T_world_camera);
+        CHECK(error.dot(known.information * error) < cairn::chi_square_quantile(1 - 1e-6, 6));
+      }
+  }
+
+  TEST_CASE(
+      "estimate_stereo_pose: few blurred landmarks from one look before are no line, and the covariance "
+      "holds") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const StereoRig rig = cairn_test::rectified_rig();
+    const cairn::Triangulator triangulator(rig, {.max_gap = 5});
+    constexpr double sigma = 6, runs = 200;
+    const auto noisy = [&](const Vector<4>& pixels) {
+      return Vector<4>(pixels +
+                       sigma * Vector<4>(random.normal(), random.normal(), random.normal(), random.normal()));
+    };
+    double nees = 0, good = 0;
+    for (int run = 0; run < static_cast<int>(runs); ++run) {
+      const SE3 T = SE3::exp(0.05 * Vector<6>(random.normal(), random.normal(), random.normal(),
+                                              random.normal(), random.normal(), random.normal()));
+      std::vector<StereoMatch> matches;
+      while (matches.size() < 12) {
+        const Vector<3> p(2 * random.uniform() - 1, 2 * random.uniform() - 1, 3 + 5 * random.uniform());
+        const auto before = rig.project(p), now = rig.project(T.inverse() * p);
+        if (!before || !now) continue;
+        StereoMatch m;
+        const Vector<4> first = noisy(*before), second = noisy(*now);
+        const cairn::Triangulation seen = triangulator(first.head<2>(), first.tail<2>(), sigma, sigma);
+        if (!seen.good()) continue;
+        m.landmark = seen.point;
+        m.covariance = seen.covariance;
+        m.left = second.head<2>();
+        m.right = second.tail<2>();
+        m.sigma_left = m.sigma_right = sigma;
+        matches.push_back(m);
+      }
+      const StereoPose pose = estimate_stereo_pose(rig, matches, {}, PosePrior{SE3()});
+      if (!pose.good()) continue;
+      ++good;
+      const Vector<6> error = cairn::local(pose.T_world_camera, T);
+      nees += error.dot(pose.information * error);
+    }
+    CAPTURE(nees / good);
+    CHECK(good >= 0.97 * runs);
+    CHECK(nees / good < 1.3 * cairn::chi_square_mean_band(6, good, 0.999).high);
+  }
+
+  // Against differences of the pixels' own derivatives.
+  TEST_CASE("pose_equations: what a landmark's noise adds to the information of the pose") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const StereoRig rig = cairn_test::rectified_rig();
+    const auto spd = [&]<int N>(std::integral_constant<int, N>) {
+      Matrix<N> A;
+      for (double& a : A.reshaped()) a = random.normal();
+      return Matrix<N>(A * A.transpose() + 0.1 * Matrix<N>::Identity());
+    };
+    for (int trial = 0; trial < 20; ++trial) {
+      const Matrix<3> C = spd(std::integral_constant<int, 3>{}), R = random_pose(random).rotation().matrix();
+      const Matrix<4> weight = spd(std::integral_constant<int, 4>{});
+      const Vector<3> p(random.normal(), random.normal(), 4 + 3 * random.uniform());
+      const auto jacobian = [&](const Vector<3>& at) {  // of the pixels by a right step
+        const auto pixels = [&](const Vector<3>& q) { return *rig.project(q); };
+        const Eigen::Matrix<double, 4, 3> H = cairn::numeric_jacobian(pixels, at);
+        Eigen::Matrix<double, 4, 6> J;
+        J << -H, H * cairn::skew(at);
+        return J;
+      };
+      Eigen::Matrix<double, 4, 6> change[3];
+      for (int i = 0; i < 3; ++i) {
+        constexpr double step = 1e-3;
+        change[i] =
+            (jacobian(p + step * Vector<3>::Unit(i)) - jacobian(p - step * Vector<3>::Unit(i))) / (2 * step);
+      }
+      Matrix<6> expected = Matrix<6>::Zero();
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) expected += C(i, j) * change[i].transpose() * weight * change[j];
+
+      const Eigen::Matrix<double, 4, 3> H = -jacobian(p).leftCols<3>();
+      const Matrix<3> W = R * H.transpose() * weight * H * R.transpose(), C_world = R * C * R.transpose();
+      const Vector<3> y = R * p, z = R.col(2);
+      cairn::detail::StereoStatistics s{};
+      cairn::detail::MatchLane covariance[6] = {}, axis[3] = {}, one = {1, 0, 0, 0};
+      for (int i = 0, k = 0; i < 3; ++i) {
+        s.y[i] = y(i) + cairn::detail::MatchLane{};
+        axis[i] = z(i) + cairn::detail::MatchLane{};
+        for (int j = i; j < 3; ++j, ++k) {
+          s.information[k][0] = W(i, j);
+          covariance[k][0] = C_world(i, j);
+        }
+      }
+      cairn::detail::PoseEquations equations;
+      equations.add_noise(s, covariance, axis, one);
+      CHECK((equations.noise(R) - expected).norm() < 1e-4 * expected.norm());
+    }
   }
 
   TEST_CASE("estimate_stereo_pose: matches that are all wrong give no consensus") {

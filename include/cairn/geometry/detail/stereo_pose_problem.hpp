@@ -7,6 +7,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -118,17 +119,36 @@ public:
     return pose;
   }
 
-  /// Information of the pose by the matches below the gate and the prior. The first part carries the
-  /// efficiency of the loss and the gate.
-  [[nodiscard]] Matrix<6> information(const SE3& pose) const {
-    PoseEquations equations;
-    linearise(lanes_, pose, gate_, RobustLoss::none, 1, equations);
-    Matrix<6> result =
-        equations.information(pose.rotation().matrix()) *
+  /// Information of the pose by the matches below the gate and the prior; nothing where a direction is left
+  /// undetermined. The first part carries the efficiency of the loss and the gate.
+  ///
+  /// Where the noise of the landmarks may be most of what J^T W J holds of a direction, the information there
+  /// is by how much the cost does rise along it. Landmarks on a line that is not known exactly: J^T W J is
+  /// sure of the turn about it, and the cost is level.
+  [[nodiscard]] std::optional<Matrix<6>> information(const SE3& pose) const {
+    constexpr double suspect = 0.1;  // share of noise in J^T W J: more than that is looked into
+    constexpr double least = 0.3;    // of J^T W J that is left
+    const double efficiency =
         robust_efficiency(options_.loss, options_.loss_scale, options_.gate_probability, gate_, dof());
+    PoseEquations equations;
+    const StereoView view(pose, rig_);
+    with_avx2_lanes([&]() CAIRN_INLINED { judge_lanes(view, equations); });
+    const Matrix<3> R = pose.rotation().matrix();
+    const Matrix<6> of_matches = efficiency * equations.information(R);
+    Matrix<6> information = of_matches;
     Vector<6> unused = Vector<6>::Zero();
-    add_prior(pose, result, unused);
-    return result;
+    add_prior(pose, information, unused);
+    const auto factor = factor_information(information);
+    if (!factor) return std::nullopt;
+    const auto [d, share] = noisiest_direction(
+        information, *factor, efficiency * static_cast<double>(noise_stride()) * equations.noise(R));
+    if (!(share > suspect)) return information;
+    const double of_prior = 1 - d.dot(of_matches * d);
+    const double left = std::max(1 - share, efficiency * rise(pose, d) + of_prior);
+    if (!(left > least)) return std::nullopt;
+    const Vector<6> along = information * d;
+    if (left < 1) information -= symmetrised(Matrix<6>((1 - left) * along * along.transpose()));
+    return information;
   }
 
 private:
@@ -163,6 +183,65 @@ private:
       }
       equations.add(s, weight);
     }
+  }
+
+  // What share of the equations is noise is known well enough from every so many matches.
+  [[nodiscard]] std::size_t noise_stride() const noexcept {
+    constexpr std::size_t enough = 64 / match_lanes;
+    return std::max<std::size_t>(1, lanes_.size() / enough);
+  }
+
+  [[gnu::always_inline]] void judge_lanes(const StereoView& view, PoseEquations& equations) const noexcept {
+    const MatchLane axis[3] = {view.left[6], view.left[7], view.left[8]};
+    const std::size_t stride = noise_stride();
+    StereoStatistics s;
+    for (std::size_t i = 0; i < lanes_.size(); ++i) {
+      const MatchLanes& m = lanes_[i];
+      if (!evaluate(m, view, gate_, s)) continue;
+      MatchLane weight;
+      for (std::size_t lane = 0; lane < match_lanes; ++lane) weight[lane] = s.chi_squared[lane] < gate_;
+      equations.add(s, weight);
+      if (i % stride == 0) equations.add_noise(s, m.covariance, axis, weight);
+    }
+  }
+
+  struct Direction {
+    Vector<6> step;    // one standard deviation long
+    double share = 0;  // of noise in what the information holds of it
+  };
+
+  // By power iteration: how sharply it is met decides nothing.
+  [[nodiscard]] static Direction noisiest_direction(const Matrix<6>& information, const Cholesky<6>& factor,
+                                                    const Matrix<6>& noise) noexcept {
+    constexpr int rounds = 12;
+    Direction result{Vector<6>::Ones()};
+    for (int i = 0; i < rounds; ++i) {
+      result.step /= std::sqrt(result.step.dot(information * result.step));
+      const Vector<6> pulled = noise * result.step;
+      result.share = result.step.dot(pulled);
+      if (!(result.share > 0)) return result;
+      if (i + 1 < rounds) result.step = factor.solve(pulled);
+    }
+    return result;
+  }
+
+  // Half the second difference of the cost along a step, over the matches that agree at `pose`.
+  [[nodiscard]] double rise(const SE3& pose, const Vector<6>& step) const noexcept {
+    const StereoView here(pose, rig_), ahead(retract(pose, step), rig_),
+        behind(retract(pose, Vector<6>(-step)), rig_);
+    const double most = 100 * gate_;  // of a match that is lost from sight
+    double sum = 0;
+    StereoStatistics s, a, b;
+    for (const MatchLanes& m : lanes_) {
+      if (!evaluate(m, here, gate_, s)) continue;
+      evaluate(m, ahead, most, a);
+      evaluate(m, behind, most, b);
+      for (std::size_t lane = 0; lane < match_lanes; ++lane)
+        if (s.chi_squared[lane] < gate_)
+          sum += 0.5 * (std::min(a.chi_squared[lane], most) + std::min(b.chi_squared[lane], most)) -
+                 s.chi_squared[lane];
+    }
+    return sum;
   }
 
   void linearise(std::span<const MatchLanes> matches, const SE3& pose, double gate, RobustLoss loss,
