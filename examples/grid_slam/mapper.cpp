@@ -403,7 +403,8 @@ std::optional<Mapper::MeasuredLoop> Mapper::measured_loop(const std::vector<SE2>
   const std::size_t begin = std::max<std::size_t>(1, by_path(travelled_[near] - submap));
   const std::size_t end = std::max(
       near + 1, std::min(by_path(travelled_[near] + submap), by_path(travelled_.back() - options.apart)));
-  cairn::OccupancyGrid grid = empty_map().grid;
+  const double cell = std::max(options_.cell_size, options.least_cell);
+  cairn::OccupancyGrid grid({{cell, 0, 0}, options_.field_radius});
   for (std::size_t i = begin; i < end; ++i) grid.insert(poses[i], points_[i - 1]);
   const std::size_t last = poses.size() - 1;
   const std::size_t since = std::max<std::size_t>(1, by_path(travelled_[last] - options.query));

@@ -48,6 +48,7 @@ struct LoopOptions {
   double submap = 4;          ///< [m] of path to either side of the old place
   double query = 3;           ///< [m] of path before the new one
   double enough_score = 0.5;  ///< of the correlation
+  double least_cell = 0.05;   ///< [m]: finer maps are compared in cells of this size
   /// Of the points that fall where the old place was seen; and of all points, where the error is less than
   /// matching bridges: farther off, the robot may see what it did not see then.
   double enough_inliers = 0.75;

@@ -62,26 +62,21 @@ public:
                    static_cast<std::size_t>(column)];
   }
 
-  /// Each cell the largest of the square of `side` cells from it on, to either axis; the result reaches
-  /// side - 1 cells further down and left. By two passes, O(cells * log side).
-  [[nodiscard]] ScoreGrid largest_of_squares(int side) const {
-    const int margin = side - 1;
-    ScoreGrid wide(geometry_, {corner_.column - margin, corner_.row - margin}, columns_ + margin,
-                   rows_ + margin);
-    for (int row = 0; row < rows_; ++row)
-      for (int column = 0; column < columns_; ++column)
-        wide(column + margin, row + margin) = static_cast<std::uint8_t>(at(column, row));
-    for (int width = 1; width < side; width = std::min(2 * width, side)) {
-      const int shift = std::min(width, side - width);
-      for (int row = 0; row < wide.rows_; ++row)
-        for (int column = 0; column + shift < wide.columns_; ++column)
-          wide(column, row) = std::max(wide(column, row), wide(column + shift, row));
-    }
-    for (int width = 1; width < side; width = std::min(2 * width, side)) {
-      const int shift = std::min(width, side - width);
-      for (int row = 0; row + shift < wide.rows_; ++row)
-        for (int column = 0; column < wide.columns_; ++column)
-          wide(column, row) = std::max(wide(column, row), wide(column, row + shift));
+  /// Each cell the larger of itself and of those `shift` cells on, to either axis and to both: squares of
+  /// `shift` cells become squares of twice as many. The result reaches `shift` cells further down and left.
+  [[nodiscard]] ScoreGrid largest_of_two(int shift) const {
+    ScoreGrid wide(geometry_, {corner_.column - shift, corner_.row - shift}, columns_ + shift, rows_ + shift);
+    const auto columns = static_cast<std::size_t>(columns_), step = static_cast<std::size_t>(shift);
+    std::vector<std::uint8_t> row(columns + step);
+    for (int r = 0; r < rows_; ++r) {
+      const std::uint8_t* from = scores_.data() + static_cast<std::size_t>(r) * columns;
+      std::copy_n(from, columns, row.begin());
+      std::fill_n(row.begin() + static_cast<std::ptrdiff_t>(columns), step, std::uint8_t{0});
+      for (std::size_t c = 0; c < columns; ++c) row[c + step] = std::max(row[c + step], from[c]);
+      for (const int to : {r, r + shift}) {
+        std::uint8_t* target = wide.scores_.data() + static_cast<std::size_t>(to) * row.size();
+        for (std::size_t c = 0; c < row.size(); ++c) target[c] = std::max(target[c], row[c]);
+      }
     }
     return wide;
   }
@@ -204,7 +199,7 @@ public:
     if (levels < 1 || levels > 8) raise("CorrelativeSearch: expected 1 to 8 levels");
     levels_.push_back(std::move(grid));
     for (int level = 1; level < levels; ++level)
-      levels_.push_back(levels_.front().largest_of_squares(1 << level));
+      levels_.push_back(levels_.back().largest_of_two(1 << (level - 1)));
   }
 
   /// The pose of the lattice around `middle` with the largest score above `least`; nothing where none is, or
