@@ -17,6 +17,7 @@
 #include <cairn/geometry/triangulation.hpp>
 #include <cairn/manifold/derivatives.hpp>
 
+#include "support/folder.hpp"
 #include "support/processors.hpp"
 #include "support/random.hpp"
 #include "support/rigs.hpp"
@@ -527,12 +528,32 @@ TEST_SUITE("stereo_pose") {
     CHECK(message([](StereoMatch& m) { m.covariance(0, 1) = NAN; }).find("match 13") != std::string::npos);
     CHECK(message([](StereoMatch& m) { m.covariance(0, 0) = -1; }).find("match 13") != std::string::npos);
     CHECK(message([](StereoMatch& m) { m.sigma_left = 0; }).find("match 13") != std::string::npos);
+    const auto correlated = [&](double xy, double xz, double yz) {
+      return message([&](StereoMatch& m) { m.covariance << 4, xy, xz, xy, 1, yz, xz, yz, 1; });
+    };
+    CHECK(correlated(2, 2, 1).empty());  // all one: a covariance, though a singular one
+    CHECK(correlated(1.8, 1.8, 0.9).empty());
+    CHECK(correlated(2.1, 0, 0).find("match 13: expected a landmark covariance") != std::string::npos);
+    CHECK(correlated(1.8, 1.8, -0.9).find("match 13: expected a landmark covariance") != std::string::npos);
     const SE3 nowhere(cairn::SO3(), Vector<3>(0, NAN, 0));
     cairn::PosePrior vague;
     vague.information(2, 3) = INFINITY;
     CHECK_THROWS_AS((void)estimate_stereo_pose(rig, good, {}, cairn::PosePrior{nowhere}), cairn::Error);
     CHECK_THROWS_AS((void)estimate_stereo_pose(rig, good, {}, vague), cairn::Error);
     CHECK_THROWS_AS((void)cairn::refine_stereo_pose(rig, good, nowhere), cairn::Error);
+    const auto prior = [&](const Matrix<6>& information) {
+      return cairn_test::message_of(
+          [&] { (void)estimate_stereo_pose(rig, good, {}, cairn::PosePrior{SE3(), information}); });
+    };
+    Matrix<6> information = Matrix<6>::Identity();
+    CHECK(prior(information).empty());
+    information(4, 4) = 0;
+    CHECK(prior(information).empty());  // of five directions
+    information(0, 1) = information(1, 0) = 1 + 1e-9;
+    CHECK(prior(information).empty());
+    information(0, 1) = 0;
+    CHECK(prior(information).find("symmetric") != std::string::npos);
+    CHECK(prior(-Matrix<6>::Identity()).find("semi-definite") != std::string::npos);
   }
 
   TEST_CASE("estimate_stereo_pose: finite numbers of any size never give anything but finite numbers") {

@@ -34,6 +34,7 @@
 #include <cairn/geometry/detail/pose_equations.hpp>
 #include <cairn/geometry/ransac.hpp>
 #include <cairn/geometry/robust_loss.hpp>
+#include <cairn/geometry/stereo_match.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
 
@@ -96,6 +97,10 @@ public:
       if (!all_finite(pairs[i].source) || !all_finite(pairs[i].target) ||
           !all_finite(pairs[i].source_covariance) || !all_finite(pairs[i].target_covariance))
         raise("align_robustly: expected finite numbers, pair " + std::to_string(i) + " has others");
+      else if (!may_be_covariance(pairs[i].source_covariance) ||
+               !may_be_covariance(pairs[i].target_covariance))
+        raise("align_robustly: expected covariances, symmetric and positive semi-definite, pair " +
+              std::to_string(i) + " has others");
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return pairs_.size(); }
@@ -246,7 +251,7 @@ private:
 }  // namespace detail
 
 /// The motion that most pairs agree with, refined on those. Throws Error, naming the pair, where a number is
-/// not finite. Deterministic in its arguments.
+/// not finite or a covariance is none. Deterministic in its arguments.
 [[nodiscard]] inline RobustAlignment align_robustly(std::span<const PointMatch> pairs,
                                                     const RobustAlignmentOptions& options = {}) {
   const detail::RigidProblem problem(pairs, options);

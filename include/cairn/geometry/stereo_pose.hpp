@@ -76,8 +76,9 @@ struct StereoPose {
   [[nodiscard]] bool good() const noexcept { return status == StereoPoseStatus::good; }
 };
 
-/// Pose of the left camera from matches of which any part may be wrong. Throws Error where a number is not
-/// finite, naming the match or the prior. Deterministic in its arguments.
+/// Pose of the left camera from matches of which any part may be wrong. Throws Error, naming the match or the
+/// prior, where a number is not finite or a covariance or information is none. Deterministic in its
+/// arguments.
 [[nodiscard]] StereoPose estimate_stereo_pose(const StereoRig& rig, std::span<const StereoMatch> matches,
                                               const StereoPoseOptions& options = {},
                                               const std::optional<PosePrior>& prior = std::nullopt);
@@ -143,7 +144,7 @@ CAIRN_INLINE StereoPose estimate_stereo_pose(const StereoRig& rig, std::span<con
 CAIRN_INLINE StereoPose refine_stereo_pose(const StereoRig& rig, std::span<const StereoMatch> matches,
                                            const SE3& start, const StereoPoseOptions& options,
                                            const std::optional<PosePrior>& prior) {
-  detail::check_start(start, Matrix<6>::Zero());
+  detail::check_start(start);
   const detail::StereoPoseProblem problem(rig, matches, options, prior);
   StereoPose result;
   result.T_world_camera = start;

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/geometry/alignment.hpp>
@@ -33,9 +34,20 @@
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
-inline void check_start(const SE3& T_world_camera, const Matrix<6>& information) {
-  if (!all_finite(T_world_camera.matrix()) || !all_finite(information))
-    raise("stereo pose: expected a finite pose and information to start from");
+inline void check_start(const SE3& T_world_camera) {
+  if (!all_finite(T_world_camera.matrix())) raise("stereo pose: expected a finite pose to start from");
+}
+
+inline void check_prior(const PosePrior& prior) {
+  constexpr double slack = 1e-6;  // more than rounding leaves of a product or an inverse
+  check_start(prior.T_world_camera);
+  if (prior.information.isZero(0)) return;
+  Matrix<6> given = symmetrised(prior.information);
+  const bool symmetric =
+      (prior.information - given).cwiseAbs().maxCoeff() <= slack * given.cwiseAbs().maxCoeff();
+  given.diagonal() *= 1 + slack;
+  if (!all_finite(prior.information) || !symmetric || !is_semi_definite<6, double>(given))
+    raise("stereo pose: expected a prior information that is finite, symmetric and positive semi-definite");
 }
 
 /// The problem that ransac() solves for a stereo pose.
@@ -55,7 +67,7 @@ public:
         lanes_((matches.size() + match_lanes - 1) / match_lanes),
         gate_(chi_square_quantile(options.gate_probability, dof())) {
     CAIRN_EXPECTS(options.loss_scale > 0, "stereo pose: loss_scale is positive");
-    if (prior) check_start(prior->T_world_camera, prior->information);
+    if (prior) check_prior(*prior);
     for (std::size_t i = 0; i < matches.size(); ++i)
       prepare(matches[i], i, rig, options.right_rows, lanes_[i / match_lanes]);
   }

@@ -209,9 +209,8 @@ using LaneMask = decltype(MatchLane{} < MatchLane{});
 
 inline void check_match(const StereoMatch& m, std::size_t index) {
   if (!all_finite(m.landmark)) refuse_match(index, "a finite landmark position");
-  if (!all_finite(m.covariance) ||
-      !(m.covariance(0, 0) >= 0 && m.covariance(1, 1) >= 0 && m.covariance(2, 2) >= 0))
-    refuse_match(index, "a finite landmark covariance with a diagonal that is not negative");
+  if (!all_finite(m.covariance) || !may_be_covariance(m.covariance))
+    refuse_match(index, "a landmark covariance: finite, symmetric, positive semi-definite");
   if (!all_finite(m.left) || !all_finite(m.right)) refuse_match(index, "finite pixels");
   if (!(m.sigma_left > 0 && m.sigma_right > 0 && std::isfinite(m.sigma_left) && std::isfinite(m.sigma_right)))
     refuse_match(index, "positive finite pixel noise");
