@@ -6,8 +6,8 @@
 /// its wheels' turns, and sees range and bearing of what is near.
 ///
 ///   pose_k+1 = pose_k exp(control dt) exp(w),   w ~ N(0, diag(speed, slip, turn density) dt) cairn::Unicycle
-///   z = (distance [m], direction from the heading [rad]) + v,   v ~ N(0, diag(range_sigma^2,
-///   bearing_sigma^2))
+///   z = (distance [m], direction from the heading [rad]) + v
+///   v ~ N(0, diag(range_sigma^2, bearing_sigma^2))
 /// The noise is that which the filters are told of, so that a filter without a mistake has no excuse.
 #pragma once
 

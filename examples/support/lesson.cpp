@@ -128,10 +128,12 @@ void Lesson::verdict(const std::string& name, double value, double low, double h
                      const std::string& hint) {
   const bool right = value >= low && value <= high;
   const std::string band = readable(low, 4) + " to " + readable(high, 4);
+  std::string more = hint.empty() ? "" : ". " + hint;
+  if (!hint.empty() && hint[0] >= 'a' && hint[0] <= 'z') more[2] = static_cast<char>(hint[0] - 'a' + 'A');
   say((right ? "ok     " : "WRONG  ") + name + ": " + readable(value, 4) + ", expected " + band);
   figure({.label = name,
           .value = readable(value, 4),
-          .hint = "expected " + band + (hint.empty() ? "" : ". " + hint),
+          .hint = "expected " + band + more,
           .verdict = right ? KeyFigure::Verdict::good : KeyFigure::Verdict::bad});
   ++verdicts_;
   if (!right) wrong_.push_back(name);
