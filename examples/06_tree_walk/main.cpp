@@ -85,7 +85,7 @@ int main(int argc, char** argv) {
        20,
        5000,
        {{"plain-radius", "r in the place of r^2 (asked of nanoflann: #94, #128, #145)"},
-        {"child-point", "distance to a point beyond the split, not to the split (scholar #343)"}}},
+        {"child-point", "distance to a point beyond the split, not to the split (elixir-nx/scholar #343)"}}},
       argc, argv);
   cairn::Random random(lesson.seed());
   std::vector<Shop> shops(lesson.steps());
