@@ -179,7 +179,7 @@ inline void append_numbers(std::string& text, const double* numbers, std::size_t
     if (fields < 8) lines.fail("at least 8 numbers: ns,px,py,pz,qw,qx,qy,qz");
     if (columns != 0 && fields != columns) lines.fail(std::to_string(columns) + " columns as above");
     columns = fields;
-    // A double holds 53 bits of the 61 that nanoseconds since 1970 need: 128 ns are lost either way.
+    // A double holds 53 bits of the 61 that nanoseconds since 1970 need: up to 250 ns are lost either way.
     detail::append_in_order(lines, trajectory, n[0] / 1e9,
                             detail::pose_of_quaternion(lines, n + 1, n[4], n[5], n[6], n[7]));
   }
