@@ -15,7 +15,7 @@
 /// The first tree splits along the principal axes; the others turn the foremost of them by random rotations,
 /// so that a point that one tree hides behind a split is in front in another. Each tree holds all points:
 /// memory and build grow with their number, a search's work does not. Where it pays, and where it does not:
-/// docs/index.md.
+/// docs/descriptors.md.
 ///
 /// Turned coordinates are rounded, which moves a point by up to a known length. Therefore points are turned
 /// about their mean, trees are searched that much farther than the collector's limit, and whoever is met
