@@ -135,11 +135,12 @@ public:
   /// undetermined. The first part carries the efficiency of the loss and the gate.
   ///
   /// Where the noise of the landmarks may be most of what J^T W J holds of a direction, the information there
-  /// is by how much the cost does rise along it. Landmarks on a line that is not known exactly: J^T W J is
-  /// sure of the turn about it, and the cost is level.
+  /// is less: by the share that is expected to be noise, and by how much the cost does rise along it, the
+  /// mean of both. Landmarks on a line that is not known exactly: J^T W J is sure of the turn about it, and
+  /// the cost is level.
   [[nodiscard]] std::optional<Matrix<6>> information(const SE3& pose) const {
     constexpr double suspect = 0.1;  // share of noise in J^T W J: more than that is looked into
-    constexpr double least = 0.3;    // of J^T W J that is left
+    constexpr double least = 0.25;   // of J^T W J that is left
     const double efficiency =
         robust_efficiency(options_.loss, options_.loss_scale, options_.gate_probability, gate_, dof());
     PoseEquations equations;
@@ -156,7 +157,7 @@ public:
         information, *factor, efficiency * static_cast<double>(noise_stride()) * equations.noise(R));
     if (!(share > suspect)) return information;
     const double of_prior = 1 - d.dot(of_matches * d);
-    const double left = std::max(1 - share, efficiency * rise(pose, d) + of_prior);
+    const double left = 0.5 * (1 - share + efficiency * rise(pose, d) + of_prior);
     if (!(left > least)) return std::nullopt;
     const Vector<6> along = information * d;
     if (left < 1) information -= symmetrised(Matrix<6>((1 - left) * along * along.transpose()));
