@@ -211,14 +211,24 @@ TEST_SUITE("stereo_pose") {
     const StereoPose plain = estimate_stereo_pose(rig, matches);
     const PosePrior wrong{random_pose(random, 3), Matrix<6>::Zero()};
     const StereoPose guided = estimate_stereo_pose(rig, matches, {}, wrong);
-    CHECK(cairn::local(plain.T_world_camera, guided.T_world_camera).norm() < 1e-5);
+    // A match at the gate may belong to the one and not to the other, which moves the pose by less than it is
+    // known to.
+    const auto same = [&](const StereoPose& other) {
+      const Vector<6> d = cairn::local(plain.T_world_camera, other.T_world_camera);
+      CAPTURE(d.dot(plain.information * d));
+      if (other.inliers == plain.inliers)
+        CHECK(d.norm() < 1e-5);
+      else
+        CHECK(d.dot(plain.information * d) < 1);
+    };
+    same(guided);
     // and with a near guess no sample is needed
     StereoPoseOptions no_samples;
     no_samples.ransac.max_iterations = 0;
     const PosePrior near{cairn::retract(T, Vector<6>(Vector<6>::Constant(0.02))), Matrix<6>::Zero()};
     const StereoPose direct = estimate_stereo_pose(rig, matches, no_samples, near);
     REQUIRE(direct.good());
-    CHECK(cairn::local(plain.T_world_camera, direct.T_world_camera).norm() < 1e-5);
+    same(direct);
   }
 
   TEST_CASE("refine_stereo_pose: gets to the same optimum from a pose nearby") {
