@@ -5,6 +5,7 @@
 /// Report pages as a reader sees them, in headless Chromium. CAIRN_SCREENSHOTS names a folder for pictures.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdlib>
 #include <filesystem>
@@ -23,10 +24,12 @@ inline bool has_chromium() {
 }
 
 /// Runs Chromium with more options; its exit code as std::system gives it. `patience` is the time [ms] that
-/// its pages have by their own clock, which skips what they wait for.
+/// its pages have by their own clock, which skips what they wait for; two minutes of ours are enough for two
+/// of theirs.
 inline int chromium(const Folder& folder, const std::string& more, int patience = 8000) {
   const std::string command =
-      "timeout 120 chromium --headless --no-sandbox --disable-gpu-sandbox --use-angle=swiftshader "
+      "timeout " + std::to_string(std::max(120, patience / 1000)) +
+      " chromium --headless --no-sandbox --disable-gpu-sandbox --use-angle=swiftshader "
       "--enable-unsafe-swiftshader --disable-dev-shm-usage --no-first-run --enable-logging=stderr "
       "--virtual-time-budget=" +
       std::to_string(patience) + " --user-data-dir='" + (folder / "profile").string() + "' " + more;

@@ -7,8 +7,11 @@
 /// than its screen, at a desk no table cut off. CAIRN_AXE says where npm has put axe-core.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <sstream>
 #include <string>
+#include <vector>
 
 #include <doctest/doctest.h>
 
@@ -33,9 +36,10 @@ inline bool can_open_pages() {
 
 namespace detail {
 
-/// Looks at the page that it stands in, then at the same page in a frame as wide as a phone and in dark, and
-/// leaves the answers as attributes of the document: data-desk, data-phone. "well" is the answer where there
-/// is nothing to object to.
+/// Looks at the page that it stands in, then at the same page in a frame as wide as a phone and in dark,
+/// leaves the answers as attributes of the document, data-desk and data-phone, and gives the document to the
+/// page around it (visit). "well" is the answer where there is nothing to object to. Waits for the promise
+/// `more`, where the page has one.
 constexpr const char* examiner = R"(<script>
 (() => {
   const phone = new URLSearchParams(location.search).has('phone');
@@ -103,7 +107,11 @@ constexpr const char* examiner = R"(<script>
     const answer = found.length > 0 ? found.join('; ') : 'well';
     if (phone) return parent.postMessage(answer, '*');
     document.documentElement.dataset.desk = answer;
-    addEventListener('message', ({ data }) => { document.documentElement.dataset.phone = data; });
+    addEventListener('message', async ({ data }) => {
+      document.documentElement.dataset.phone = data;
+      await globalThis.more;
+      parent.postMessage(document.documentElement.outerHTML, '*');
+    });
     const frame = document.createElement('iframe');
     frame.width = 390;
     frame.height = 844;
@@ -115,6 +123,49 @@ constexpr const char* examiner = R"(<script>
 })();
 </script>)";
 
+/// Shows page0.html, page1.html, ... of its folder, one after the other, each as large as the window, and
+/// keeps the document that each becomes.
+constexpr const char* visit = R"(<!doctype html><meta charset="utf-8">
+<style>body { margin: 0 } iframe { border: 0; width: 100vw; height: 100vh }</style>
+<script>
+addEventListener('load', async () => {
+  for (let i = 0; i < pages; ++i) {
+    const frame = document.createElement('iframe');
+    frame.src = `page${i}.html`;
+    const answer = new Promise((done) => addEventListener('message', ({ data }) => done(data), { once: true }));
+    document.body.append(frame);
+    const text = await answer;
+    frame.remove();
+    const kept = document.createElement('pre');
+    kept.hidden = true;
+    kept.textContent = text;
+    document.body.append(kept);
+  }
+});
+</script>)";
+
+/// The next text that visit() has kept, from `at` on, which moves behind it; empty where there is none.
+inline std::string next_document(const std::string& visited, std::size_t& at) {
+  static const std::string begin = "<pre hidden=\"\">";
+  const std::size_t first = visited.find(begin, at);
+  if (first == std::string::npos) return {};
+  const std::size_t end = visited.find("</pre>", first);
+  at = end;
+  std::string text = visited.substr(first + begin.size(), end - first - begin.size());
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    std::string whole;
+    std::size_t last = 0;
+    for (std::size_t found; (found = text.find(from, last)) != std::string::npos; last = found + from.size())
+      whole.append(text, last, found - last) += to;
+    text = whole.append(text, last);
+  };
+  replace("&lt;", "<");
+  replace("&gt;", ">");
+  replace("&nbsp;", "\u00a0");
+  replace("&amp;", "&");
+  return text;
+}
+
 /// The value of an attribute of the document.
 inline std::string attribute(const OpenedPage& opened, const std::string& name) {
   const std::size_t at = opened.document.find(" " + name + "=\"");
@@ -125,9 +176,10 @@ inline std::string attribute(const OpenedPage& opened, const std::string& name) 
 
 }  // namespace detail
 
-/// Opens a copy of the page, with `more` at its end, and holds it against what every page promises.
-inline OpenedPage check_page(const std::filesystem::path& page, const std::string& more = "") {
-  CAPTURE(page.string());
+/// Opens copies of the pages, each with `more` at its end, in one visit of the browser, whose beginning takes
+/// it longer than a page, and holds each against what every page promises.
+inline std::vector<OpenedPage> check_pages(const std::vector<std::filesystem::path>& pages,
+                                           const std::string& more = "") {
   const Folder folder;
   const std::filesystem::path axe = CAIRN_AXE;
   std::string judge;
@@ -135,14 +187,34 @@ inline OpenedPage check_page(const std::filesystem::path& page, const std::strin
     judge = "<script>" + cairn::read_file(axe) + "</script>";
   else
     MESSAGE("skipped: no axe-core (npm)");
-  cairn::write_file_atomically(folder / "page.html",
-                               cairn::read_file(page) + judge + detail::examiner + more);
-  OpenedPage opened = open_page(folder, folder / "page.html", 120000);
-  CHECK(opened.console == "");
-  CHECK(opened.has("data-panels=\""));
-  CHECK(detail::attribute(opened, "data-desk") == "well");
-  CHECK(detail::attribute(opened, "data-phone") == "well");
+  const auto name = [](std::size_t i) { return "page" + std::to_string(i) + ".html"; };
+  for (std::size_t i = 0; i < pages.size(); ++i)
+    cairn::write_file_atomically(folder / name(i),
+                                 cairn::read_file(pages[i]) + more + judge + detail::examiner);
+  cairn::write_file_atomically(
+      folder / "visit.html",
+      "<script>const pages = " + std::to_string(pages.size()) + ";</script>" + detail::visit);
+  const int patience = 120000 * static_cast<int>(pages.size());
+  const OpenedPage visited = open_page(folder, folder / "visit.html", patience);
+  std::vector<OpenedPage> opened(pages.size());
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < pages.size(); ++i) {
+    CAPTURE(pages[i].string());
+    opened[i].document = detail::next_document(visited.document, at);
+    std::istringstream console(visited.console);
+    for (std::string line; std::getline(console, line);)
+      if (line.find(name(i)) != std::string::npos) opened[i].console += line + "\n";
+    CHECK(opened[i].console == "");
+    CHECK(opened[i].has("data-panels=\""));
+    CHECK(detail::attribute(opened[i], "data-desk") == "well");
+    CHECK(detail::attribute(opened[i], "data-phone") == "well");
+  }
+  CHECK(visited.console == "");
   return opened;
+}
+
+inline OpenedPage check_page(const std::filesystem::path& page, const std::string& more = "") {
+  return check_pages({page}, more).front();
 }
 
 }  // namespace cairn_test
