@@ -10,7 +10,7 @@
 #include <tuple>
 #include <vector>
 
-#include <Eigen/Dense>
+#include <Eigen/LU>
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>

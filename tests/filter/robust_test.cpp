@@ -3,7 +3,6 @@
 #include <cmath>
 #include <stdexcept>
 
-#include <Eigen/Cholesky>
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
@@ -13,6 +12,7 @@
 #include <cairn/models/linear.hpp>
 
 #include "filter/linear_problems.hpp"
+#include "support/elimination.hpp"
 #include "support/random.hpp"
 
 namespace robust_test {
@@ -144,7 +144,7 @@ TEST_SUITE("robust") {
     cairn::Random random(seed);
     const LinearProblem<2, 2> p(random);
     const Matrix<2> truth = (Matrix<2>() << 1.0, 0.4, 0.4, 0.5).finished();
-    const Matrix<2> root = Eigen::LLT<Matrix<2>>(truth).matrixL();
+    const Matrix<2> root = cairn_test::lower_root(truth);
     auto learner = p.sensor;
     learner.covariance = 9.0 * Matrix<2>::Identity();
     auto belief = p.prior;

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <doctest/doctest.h>
 
@@ -16,6 +15,7 @@
 
 #include "filter/linear_problems.hpp"
 #include "filter/nile.hpp"
+#include "support/elimination.hpp"
 #include "support/random.hpp"
 
 namespace smoother_test {
@@ -114,8 +114,8 @@ TEST_SUITE("smoother") {
     constexpr int size = 2 * (steps + 1);
     Matrix<cairn::dynamic> information = Matrix<cairn::dynamic>::Zero(size, size);
     Vector<cairn::dynamic> vector = Vector<cairn::dynamic>::Zero(size);
-    const Matrix<2> inverse_q = Eigen::LLT<Matrix<2>>(p.process.covariance).solve(Matrix<2>::Identity());
-    const Matrix<2> inverse_p = Eigen::LLT<Matrix<2>>(p.prior.covariance).solve(Matrix<2>::Identity());
+    const Matrix<2> inverse_q = cairn_test::inverse_of(p.process.covariance);
+    const Matrix<2> inverse_p = cairn_test::inverse_of(p.prior.covariance);
     information.topLeftCorner<2, 2>() += inverse_p;
     vector.head<2>() += inverse_p * p.prior.mean;
     Recorder<Kalman, Vector<2>> recorder(Kalman{}, p.prior);
@@ -133,9 +133,8 @@ TEST_SUITE("smoother") {
       information.block<2, 2>(2 * k, 2 * k) += weight * p.sensor.design.transpose() * p.sensor.design;
       vector.segment<2>(2 * k) += weight * z(0) * p.sensor.design.transpose();
     }
-    const Eigen::LLT<Matrix<cairn::dynamic>> root(information);
-    const Vector<cairn::dynamic> batch = root.solve(vector);
-    const Matrix<cairn::dynamic> covariance = root.solve(Matrix<cairn::dynamic>::Identity(size, size));
+    const Vector<cairn::dynamic> batch = cairn_test::solved(information, vector);
+    const Matrix<cairn::dynamic> covariance = cairn_test::inverse_of(information);
     const auto path = recorder.smoothed();
     const auto unscented_path = unscented.smoothed();
     for (int k = 0; k <= steps; ++k) {

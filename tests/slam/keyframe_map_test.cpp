@@ -7,7 +7,6 @@
 #include <limits>
 #include <vector>
 
-#include <Eigen/Cholesky>
 #include <doctest/doctest.h>
 
 #include <cairn/core/check.hpp>
@@ -15,6 +14,7 @@
 #include <cairn/slam/keyframe_map.hpp>
 
 #include "simulated_arena.hpp"
+#include "support/elimination.hpp"
 #include "support/random.hpp"
 
 namespace keyframe_map_test {
@@ -145,7 +145,7 @@ Matrix<dynamic> full_covariance(const Scene& s, double first_sigma, const cairn:
           if (row >= 0 && column >= 0) information(row, column) += J.col(a).dot(J.col(b));
         }
     }
-  const Matrix<dynamic> inverse = information.llt().solve(Matrix<dynamic>::Identity(all, all));
+  const Matrix<dynamic> inverse = cairn_test::inverse_of(information);
   return inverse.topLeftCorner(n, n);
 }
 
@@ -248,8 +248,8 @@ TEST_SUITE("keyframe_map") {
     cairn::detail::KeyframeSolution solution;
     REQUIRE(equations.solve(P, solution));
     Matrix<dynamic> M = equations.information();
-    M.topLeftCorner(12, 12) += P.llt().solve(Matrix<dynamic>::Identity(12, 12));
-    const Matrix<dynamic> inverse = M.llt().solve(Matrix<dynamic>::Identity(18, 18));
+    M.topLeftCorner(12, 12) += cairn_test::inverse_of(P);
+    const Matrix<dynamic> inverse = cairn_test::inverse_of(M);
     CHECK((solution.covariance - inverse).norm() < 1e-7 * inverse.norm());
     CHECK((solution.step - inverse * equations.gradient()).norm() < 1e-7 * solution.step.norm());
   }
@@ -263,9 +263,9 @@ TEST_SUITE("keyframe_map") {
     const Matrix<dynamic> found = mapped(s, options).covariance();
     REQUIRE(found.rows() == expected.rows());
     // Neither is larger by more than a few percent in any direction.
-    const Eigen::LLT<Matrix<dynamic>> factor(expected);
-    const Matrix<dynamic> half = factor.matrixL().solve(found);
-    const Matrix<dynamic> ratio = factor.matrixL().solve(Matrix<dynamic>(half.transpose()));
+    const Matrix<dynamic> factor = cairn_test::lower_root(expected);
+    const Matrix<dynamic> half = cairn_test::solved(factor, found);
+    const Matrix<dynamic> ratio = cairn_test::solved(factor, half.transpose());
     CHECK((ratio - Matrix<dynamic>::Identity(24, 24)).cwiseAbs().maxCoeff() < 0.05);
   }
 
@@ -293,9 +293,9 @@ TEST_SUITE("keyframe_map") {
     CHECK(of_rig(7, 7) < 0.1 * 4e-6);                            // and the ratio of the focal lengths
     CHECK(of_rig(5, 5) == doctest::Approx(1e-6).epsilon(1e-3));  // the size of the world is not
     const Matrix<dynamic> poses = expected.topLeftCorner(24, 24);
-    const Eigen::LLT<Matrix<dynamic>> factor(poses);
-    const Matrix<dynamic> half = factor.matrixL().solve(found);
-    const Matrix<dynamic> ratio = factor.matrixL().solve(Matrix<dynamic>(half.transpose()));
+    const Matrix<dynamic> factor = cairn_test::lower_root(poses);
+    const Matrix<dynamic> half = cairn_test::solved(factor, found);
+    const Matrix<dynamic> ratio = cairn_test::solved(factor, half.transpose());
     CHECK((ratio - Matrix<dynamic>::Identity(24, 24)).cwiseAbs().maxCoeff() < 0.08);
   }
 

@@ -14,10 +14,10 @@
 #include <string>
 #include <vector>
 
-#include <Eigen/Cholesky>
-
 #include <cairn/geometry/stereo_pose.hpp>
 #include <cairn/geometry/triangulation.hpp>
+
+#include "support/elimination.hpp"
 
 namespace cairn_test {
 
@@ -90,10 +90,10 @@ inline cairn::StereoMatch match(const cairn::Vector<4>& pixels, const Sighting& 
 
 /// Static landmark, F = H = I; sightings further than four sigmas are left out.
 inline void fuse(Sighting& map, const Sighting& seen) {
-  const Eigen::LLT<cairn::Matrix<3>> S(map.covariance + seen.covariance);
+  const cairn::Matrix<3> S = map.covariance + seen.covariance;
   const cairn::Vector<3> innovation = seen.point - map.point;
-  if (innovation.dot(S.solve(innovation)) > 16) return;
-  const cairn::Matrix<3> gain = S.solve(map.covariance).transpose();
+  if (normalised_square(S, innovation) > 16) return;
+  const cairn::Matrix<3> gain = solved(S, map.covariance).transpose();
   map.point += gain * innovation;
   map.covariance = cairn::symmetrised(map.covariance - gain * map.covariance);
 }
