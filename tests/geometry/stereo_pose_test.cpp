@@ -413,6 +413,7 @@ TEST_SUITE("stereo_pose") {
       const StereoPose pose = estimate_stereo_pose(rig, matches, {}, PosePrior{SE3()});
       if (!pose.good()) continue;
       ++good;
+      CHECK((pose.covariance * pose.information - Matrix<6>::Identity()).norm() < 1e-6);
       const Vector<6> error = cairn::local(pose.T_world_camera, T);
       nees += error.dot(pose.information * error);
     }
@@ -545,6 +546,8 @@ TEST_SUITE("stereo_pose") {
     CHECK(correlated(1.8, 1.8, 0.9).empty());
     CHECK(correlated(2.1, 0, 0).find("match 13: expected a landmark covariance") != std::string::npos);
     CHECK(correlated(1.8, 1.8, -0.9).find("match 13: expected a landmark covariance") != std::string::npos);
+    CHECK(message([](StereoMatch& m) { m.covariance << 4, 1, 0, 0, 1, 0, 0, 0, 1; }).find("match 13") !=
+          std::string::npos);  // not symmetric, though the mean of both triangles is a covariance
     const SE3 nowhere(cairn::SO3(), Vector<3>(0, NAN, 0));
     cairn::PosePrior vague;
     vague.information(2, 3) = INFINITY;
@@ -564,6 +567,53 @@ TEST_SUITE("stereo_pose") {
     information(0, 1) = 0;
     CHECK(prior(information).find("symmetric") != std::string::npos);
     CHECK(prior(-Matrix<6>::Identity()).find("semi-definite") != std::string::npos);
+  }
+
+  // The least eigenvalue at a diagonal of 1 is the measure, whatever the units.
+  TEST_CASE_TEMPLATE("nearly_semi_definite: forgives a thousandth, and no more", Size,
+                     std::integral_constant<int, 3>, std::integral_constant<int, 6>) {
+    constexpr int N = Size::value;
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const auto scaled = [&](const Matrix<N>& a, double units) {
+      Matrix<N> result;
+      Vector<N> unit;
+      for (double& u : unit) u = std::pow(10, random.uniform(-units, units));
+      for (int i = 0; i < N; ++i)
+        for (int j = 0; j < N; ++j) result(i, j) = unit(i) * a(i, j) * unit(j);
+      return result;
+    };
+    for (int trial = 0; trial < 200; ++trial) {
+      // All correlations alike, up to signs: the least eigenvalue is 1 + (N - 1) correlation.
+      const double least = random.uniform(-2e-3, 1e-3);
+      Vector<N> sign;
+      for (double& one : sign) one = random.uniform() < 0.5 ? -1 : 1;
+      Matrix<N> alike = (least - 1) / (N - 1) * sign * sign.transpose();
+      alike.diagonal().setOnes();
+      CAPTURE(least);
+      CHECK(cairn::detail::nearly_semi_definite(scaled(alike, 3)) == (least > -1e-3));
+
+      Matrix<N> crooked = Matrix<N>::Identity();
+      crooked(N - 1, 0) = random.uniform(-2e-3, 2e-3);
+      const bool straight = std::abs(crooked(N - 1, 0)) < 1e-3;
+      CHECK(cairn::detail::nearly_semi_definite(scaled(crooked, 3)) == straight);
+
+      Matrix<N> root = Matrix<N>::Zero();  // singular, with rows of zeros, rounded to floats
+      for (int i = 0; i < N - 1; ++i)
+        for (int j = 0; j < 1 + trial % (N - 1); ++j) root(i, j) = random.normal();
+      const Matrix<N> singular = scaled(root * root.transpose(), 0);
+      CHECK(cairn::detail::nearly_semi_definite(singular));
+      CHECK(cairn::detail::nearly_semi_definite(
+          Matrix<N>(singular.template cast<float>().template cast<double>())));
+      Matrix<N> none = singular;
+      none(N - 1, 0) = none(0, N - 1) = 1e-3;  // a covariance with what does not vary
+      CHECK_FALSE(cairn::detail::nearly_semi_definite(none));
+      none = singular;
+      none(trial % N, trial / 7 % N) = trial % 2 == 0 ? NAN : INFINITY;
+      CHECK_FALSE(cairn::detail::nearly_semi_definite(none));
+    }
+    CHECK(cairn::detail::nearly_semi_definite(Matrix<N>(Matrix<N>::Zero())));
   }
 
   TEST_CASE("estimate_stereo_pose: finite numbers of any size never give anything but finite numbers") {

@@ -28,8 +28,9 @@
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
-#include <cairn/geometry/detail/pose_equations.hpp>
+#include <cairn/geometry/detail/robust_pose.hpp>
 #include <cairn/geometry/rig_correction.hpp>
+#include <cairn/geometry/robust_loss.hpp>
 #include <cairn/geometry/triangulation.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>

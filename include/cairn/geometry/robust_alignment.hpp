@@ -10,10 +10,9 @@
 ///
 /// The lever p is where both sightings together put the point, p = T^-1 y - R^T C_y R C^-1 r: with T^-1 y in
 /// its place the step would leave out that C turns with R. Its noise, of covariance C_p = C_x C^-1 R^T C_y R,
-/// is lever too, so that J^T C^-1 J holds more of the rotation than there is to know,
-///   E[skew(n)^T W skew(n)] = W S + S W - tr(W) S - tr(S) W + (tr(W) tr(S) - tr(W S)) I,   W = C^-1, S = C_p
-///   (2)
-/// which is taken off; a direction that has less than four times as much beside it is undetermined.
+/// is lever too, so that J^T C^-1 J holds more of the rotation than there is to know, by the mixed cofactors
+/// of C^-1 and C_p (detail/robust_pose.hpp). They are taken off; a direction that has less than four times as
+/// much beside it is undetermined.
 #pragma once
 
 #include <algorithm>
@@ -31,10 +30,9 @@
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/geometry/alignment.hpp>
-#include <cairn/geometry/detail/pose_equations.hpp>
+#include <cairn/geometry/detail/robust_pose.hpp>
 #include <cairn/geometry/ransac.hpp>
 #include <cairn/geometry/robust_loss.hpp>
-#include <cairn/geometry/stereo_match.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
 
@@ -93,14 +91,12 @@ public:
 
   RigidProblem(std::span<const PointMatch> pairs, const RobustAlignmentOptions& options)
       : pairs_(pairs), options_(options), gate_(chi_square_quantile(options.gate_probability, 3)) {
-    for (std::size_t i = 0; i < pairs.size(); ++i)
-      if (!all_finite(pairs[i].source) || !all_finite(pairs[i].target) ||
-          !all_finite(pairs[i].source_covariance) || !all_finite(pairs[i].target_covariance))
-        raise("align_robustly: expected finite numbers, pair " + std::to_string(i) + " has others");
-      else if (!may_be_covariance(pairs[i].source_covariance) ||
-               !may_be_covariance(pairs[i].target_covariance))
-        raise("align_robustly: expected covariances, symmetric and positive semi-definite, pair " +
-              std::to_string(i) + " has others");
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      const PointMatch& pair = pairs[i];
+      if (!all_finite(pair.source) || !all_finite(pair.target)) refuse_pair(i, "finite points");
+      if (!nearly_semi_definite(pair.source_covariance) || !nearly_semi_definite(pair.target_covariance))
+        refuse_pair(i, "covariances: finite, symmetric, positive semi-definite");
+    }
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return pairs_.size(); }
@@ -139,35 +135,30 @@ public:
 
   /// One reweighted Gauss-Newton step: its length in standard deviations, squared.
   [[nodiscard]] std::optional<double> step(SE3& motion, double gate) const {
-    const auto [information, gradient] = linearise(motion, gate, options_.loss);
-    const auto factor = factor_information(information);
-    if (!factor) return std::nullopt;
-    const Vector<6> d = factor->solve(gradient);
-    motion = retract(motion, d);
-    return d.dot(gradient);
+    return newton_step(linearise(motion, gate, options_.loss), motion);
   }
   [[nodiscard]] std::optional<double> step(SE3& motion) const { return step(motion, gate_); }
 
-  /// Of the pairs that agree, without what is noise; nothing where that leaves a direction undetermined.
-  [[nodiscard]] std::optional<Matrix<6>> information(const SE3& motion) const {
+  /// By the pairs that agree, without what is noise; nothing where that leaves a direction undetermined.
+  [[nodiscard]] std::optional<Certainty> certainty(const SE3& motion) const {
     constexpr double least_signal = 4;  // levers twice as long as their deviation
-    const Matrix<6> information = linearise(motion, gate_, RobustLoss::none).information;
-    const Matrix<3> noise = lever_noise(motion);
-    Matrix<6> seen = information, doubtful = information;
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) {
-        seen(3 + i, 3 + j) -= noise(i, j);
-        doubtful(3 + i, 3 + j) -= (1 + least_signal) * noise(i, j);
-      }
-    if (!factor_information(doubtful)) return std::nullopt;
-    return seen * robust_efficiency(options_.loss, options_.loss_scale, options_.gate_probability, gate_, 3);
+    Matrix<3> of_levers = Matrix<3>::Zero();
+    const Matrix<6> information = linearise(motion, gate_, RobustLoss::none, &of_levers).information;
+    Matrix<6> noise = Matrix<6>::Zero();
+    put(noise, 3, 3, of_levers);
+    if (!factor_information(information - (1 + least_signal) * noise)) return std::nullopt;
+    const double efficiency =
+        robust_efficiency(options_.loss, options_.loss_scale, options_.gate_probability, gate_, 3);
+    const Matrix<6> seen = efficiency * (information - noise);
+    const auto factor = factor_information(seen);
+    if (!factor) return std::nullopt;
+    return Certainty{seen, factor->inverse()};
   }
 
 private:
-  struct Equations {
-    Matrix<6> information;
-    Vector<6> gradient;
-  };
+  [[noreturn, gnu::cold, gnu::noinline]] static void refuse_pair(std::size_t index, const char* what) {
+    raise("align_robustly: pair " + std::to_string(index) + ": expected " + what);
+  }
 
   struct Frame {
     SE3 T_source_target;
@@ -183,19 +174,19 @@ private:
     Residual(const PointMatch& pair, const Frame& frame)
         : q(frame.T_source_target * pair.target),
           r(q - pair.source),
-          of_target(turned(pair, frame)),
+          of_target(product_transposed(product(frame.R_source_target, pair.target_covariance),
+                                       frame.R_source_target)),
           factor(Matrix<3>(pair.source_covariance + of_target)) {}
     // Infinite where the covariance is not positive definite: nothing can be said.
     [[nodiscard]] double chi_squared() const noexcept {
       return factor.good() ? factor.whiten(r).squaredNorm() : std::numeric_limits<double>::infinity();
     }
-    [[nodiscard]] static Matrix<3> turned(const PointMatch& pair, const Frame& frame) noexcept {
-      const Matrix<3> half = product(frame.R_source_target, pair.target_covariance);
-      return product_transposed(half, frame.R_source_target);
-    }
   };
 
-  [[nodiscard]] Equations linearise(const SE3& motion, double gate, RobustLoss loss) const {
+  /// By (1), of the pairs below the gate; what the noise of the levers adds to the rotation goes to
+  /// `of_levers`.
+  [[nodiscard]] NormalEquations linearise(const SE3& motion, double gate, RobustLoss loss,
+                                          Matrix<3>* of_levers = nullptr) const {
     const Frame frame(motion);
     Matrix<3> translation = Matrix<3>::Zero(), coupling = Matrix<3>::Zero(), rotation = Matrix<3>::Zero();
     Vector<3> force = Vector<3>::Zero(), moment = Vector<3>::Zero();
@@ -214,8 +205,12 @@ private:
       rotation += transposed_product(lever, weight_lever);
       force += pull;
       moment -= transposed_product(lever, pull);
+      if (of_levers == nullptr) continue;
+      const Matrix<3> spread = symmetrised(product(pair.source_covariance, share));  // C_p
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) add_mixed_cofactor(weight, spread, i, j, (*of_levers)(i, j));
     }
-    Equations e;  // J^T weight J and -J^T weight r, J of (1)
+    NormalEquations e;
     put(e.information, 0, 0, translation);
     put(e.information, 0, 3, coupling);
     put(e.information, 3, 0, transposed(coupling));
@@ -224,23 +219,6 @@ private:
     put(e.gradient, 3, 0, moment);
     e.information = symmetrised(e.information);
     return e;
-  }
-
-  /// What the noise of the levers adds to the information of the rotation, of the pairs that agree: (2).
-  [[nodiscard]] Matrix<3> lever_noise(const SE3& motion) const {
-    const Frame frame(motion);
-    Matrix<3> sum = Matrix<3>::Zero();
-    for (const PointMatch& pair : pairs_) {
-      const Residual residual(pair, frame);
-      if (!(residual.chi_squared() < gate_)) continue;
-      const Matrix<3> w = residual.factor.inverse();
-      const Matrix<3> s = symmetrised(product(pair.source_covariance, product(w, residual.of_target)));
-      const Matrix<3> both = product(w, s);
-      const double size_w = w.trace(), size_s = s.trace();
-      sum += both + both.transpose() - size_w * s - size_s * w;
-      for (int i = 0; i < 3; ++i) sum(i, i) += size_w * size_s - both.trace();
-    }
-    return sum;
   }
 
   std::span<const PointMatch> pairs_;
@@ -263,27 +241,7 @@ private:
   result.status = RobustAlignmentStatus::no_consensus;
   if (!best.model || !detail::enough_inliers(best.score.inliers, pairs.size(), options)) return result;
   SE3 motion = *best.model;
-  result.status = RobustAlignmentStatus::degenerate;
-  constexpr int most_steps = 15;
-  for (int i = 0; i < most_steps; ++i) {
-    const auto length = problem.step(motion);
-    if (!length) return result;
-    if (*length < 1e-6) break;
-  }
-  const std::optional<Matrix<6>> information = problem.information(motion);
-  if (!information) return result;
-  const auto factor = detail::factor_information(*information);
-  if (!factor) return result;
-  const RansacScore score = problem.score(motion, std::numeric_limits<double>::infinity());
-  result.status = !detail::enough_inliers(score.inliers, pairs.size(), options)
-                      ? RobustAlignmentStatus::no_consensus
-                      : RobustAlignmentStatus::good;
-  if (!result.good()) return result;
-  result.T_target_source = motion;
-  result.information = *information;
-  result.covariance = factor->inverse();
-  result.inlier_count = score.inliers;
-  problem.inliers(motion, result.inliers);
+  if (detail::settle(problem, motion, options, result)) result.T_target_source = motion;
   return result;
 }
 

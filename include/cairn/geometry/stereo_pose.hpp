@@ -21,7 +21,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -34,7 +33,7 @@
 #include <cairn/version.hpp>
 
 #if !CAIRN_ELSEWHERE  // else cairn::compiled holds what needs these
-#include <cairn/geometry/detail/pose_equations.hpp>
+#include <cairn/geometry/detail/robust_pose.hpp>
 #include <cairn/geometry/detail/stereo_pose_problem.hpp>
 #include <cairn/geometry/ransac.hpp>
 #endif
@@ -91,38 +90,6 @@ struct StereoPose {
 
 #if !CAIRN_ELSEWHERE
 
-namespace detail {
-
-/// Reweighted Gauss-Newton to convergence from `pose`, then verdict, covariance and mask.
-inline void finish_stereo_pose(const StereoPoseProblem& problem, SE3 pose, const StereoPoseOptions& options,
-                               StereoPose& result) {
-  result.status = StereoPoseStatus::degenerate;
-  constexpr int most_steps = 15;
-  for (int step = 0; step < most_steps; ++step) {
-    const auto length = problem.step(pose);
-    if (!length) return;
-    if (*length < 1e-5) break;  // 0.003 standard deviations, and the next step would be far shorter
-  }
-  const auto information = problem.information(pose);
-  if (!information) return;
-  const auto factor = factor_information(*information);
-  if (!factor) return;
-  const RansacScore score = problem.score(pose, std::numeric_limits<double>::infinity());
-  result.cost = score.cost;
-  if (!enough_inliers(score.inliers, problem.size(), options)) {
-    result.status = StereoPoseStatus::no_consensus;
-    return;
-  }
-  result.status = StereoPoseStatus::good;
-  result.T_world_camera = pose;
-  result.information = *information;
-  result.covariance = factor->inverse();
-  result.inlier_count = score.inliers;
-  problem.inliers(pose, result.inliers);
-}
-
-}  // namespace detail
-
 CAIRN_INLINE StereoPose estimate_stereo_pose(const StereoRig& rig, std::span<const StereoMatch> matches,
                                              const StereoPoseOptions& options,
                                              const std::optional<PosePrior>& prior) {
@@ -136,8 +103,9 @@ CAIRN_INLINE StereoPose estimate_stereo_pose(const StereoRig& rig, std::span<con
   const auto best = ransac(problem, options.ransac, std::span<const SE3>(guesses));
   result.iterations = best.iterations;
   result.status = StereoPoseStatus::no_consensus;
-  if (best.model && detail::enough_inliers(best.score.inliers, matches.size(), options))
-    detail::finish_stereo_pose(problem, *best.model, options, result);
+  if (!best.model || !detail::enough_inliers(best.score.inliers, matches.size(), options)) return result;
+  SE3 pose = *best.model;
+  if (detail::settle(problem, pose, options, result)) result.T_world_camera = pose;
   return result;
 }
 
@@ -151,7 +119,7 @@ CAIRN_INLINE StereoPose refine_stereo_pose(const StereoRig& rig, std::span<const
   result.inliers.assign(matches.size(), 0);
   if (matches.size() < options.min_inliers) return result;
   SE3 pose = problem.approach(start);
-  if (problem.refine(pose)) detail::finish_stereo_pose(problem, pose, options, result);
+  if (problem.refine(pose) && detail::settle(problem, pose, options, result)) result.T_world_camera = pose;
   return result;
 }
 

@@ -20,22 +20,55 @@
 ///   rotation     tr(C W) h h^T + u h^T + h u^T - X - X^T + the mixed cofactors of C and W
 #pragma once
 
-#include <cstddef>
-#include <optional>
-
-#include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/geometry/detail/robust_pose.hpp>
 #include <cairn/geometry/detail/stereo_residual.hpp>
-#include <cairn/geometry/robust_loss.hpp>
+#include <cairn/simd/processor.hpp>
+#include <cairn/simd/registers.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
-/// Whether so many agree that it is a consensus, by the options' min_inliers and min_share.
-template <class Options>
-[[nodiscard]] bool enough_inliers(std::size_t inliers, std::size_t count, const Options& options) noexcept {
-  return inliers >= options.min_inliers &&
-         static_cast<double>(inliers) >= options.min_share * static_cast<double>(count);
+/// The symmetric matrix of which these are 00 01 02 11 12 22.
+struct Packed {
+  const MatchLane (&entries)[6];
+  [[gnu::always_inline]] const MatchLane& operator()(int i, int j) const noexcept {
+    constexpr int place[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
+    return entries[place[i][j]];
+  }
+};
+
+/// Calls body(i, j) for each entry of a 3x3 matrix, written out.
+template <class Body>
+[[gnu::always_inline]] inline void each_entry(const Body& body) noexcept {
+  each<9>([&](int k) CAIRN_INLINED { body(k / 3, k % 3); });
+}
+
+/// a x b.
+[[gnu::always_inline]] inline void cross(const MatchLane (&a)[3], const MatchLane (&b)[3],
+                                         MatchLane (&result)[3]) noexcept {
+  each<3>([&](int i) CAIRN_INLINED {
+    const int k = (i + 1) % 3, l = (i + 2) % 3;
+    result[i] = a[k] * b[l] - a[l] * b[k];
+  });
+}
+
+/// W skew(v): the rows of W, each times v.
+[[gnu::always_inline]] inline void times_skew(const Packed& W, const MatchLane (&v)[3],
+                                              MatchLane (&result)[3][3]) noexcept {
+  each_entry([&](int i, int j) CAIRN_INLINED {
+    const int k = (j + 1) % 3, l = (j + 2) % 3;
+    result[i][j] = W(i, k) * v[l] - W(i, l) * v[k];
+  });
+}
+
+/// skew(v)^T M: the columns of M, each times v.
+[[gnu::always_inline]] inline void skew_times(const MatchLane (&v)[3], const MatchLane (&M)[3][3],
+                                              MatchLane (&result)[3][3]) noexcept {
+  each_entry([&](int i, int j) CAIRN_INLINED {
+    const int k = (i + 1) % 3, l = (i + 2) % 3;
+    result[i][j] = v[l] * M[k][j] - v[k] * M[l][j];
+  });
 }
 
 /// Normal equations of a pose step in world axes, a partial sum in each lane.
@@ -43,33 +76,66 @@ class alignas(MatchLane) PoseEquations {
 public:
   /// (1) with y = R p for p and world axes for the step's.
   [[gnu::always_inline]] void add(const StereoStatistics& s, const MatchLane& weight) noexcept {
-    MatchLane W[6], g[3];
-    for (int i = 0; i < 6; ++i) W[i] = weight * s.information[i];
-    for (int i = 0; i < 3; ++i) g[i] = weight * s.gradient[i];
+    MatchLane weighted[6], force[3], moment[3], lever[3][3], rotation[3][3];
+    each<6>([&](int i) CAIRN_INLINED { weighted[i] = weight * s.information[i]; });
+    each<3>([&](int i) CAIRN_INLINED { force[i] = weight * s.gradient[i]; });
+    times_skew(Packed{weighted}, s.y, lever);
+    skew_times(s.y, lever, rotation);
+    cross(s.y, force, moment);
+    each<3>([&](int i) CAIRN_INLINED {
+      gradient_[i] -= force[i];
+      gradient_[3 + i] -= moment[i];
+    });
+    each_entry([&](int i, int j) CAIRN_INLINED { sums_.coupling[i][j] -= lever[i][j]; });
+    each<6>([&](int k) CAIRN_INLINED {
+      sums_.translation[k] += weighted[k];
+      sums_.rotation[k] += rotation[row_of[k]][column_of[k]];
+    });
+  }
+
+  /// Adds to noise() what the landmarks' covariances, in world axes, do to J, by (4). `axis` is the camera's,
+  /// in world axes.
+  [[gnu::always_inline]] void add_noise(const StereoStatistics& s, const MatchLane (&covariance)[6],
+                                        const MatchLane (&axis)[3], const MatchLane& weight) noexcept {
     const MatchLane(&y)[3] = s.y;
-    const MatchLane rows[3][3] = {{W[0], W[1], W[2]}, {W[1], W[3], W[4]}, {W[2], W[4], W[5]}};
-    MatchLane lever[3][3];  // W skew(y)
-    for (int i = 0; i < 3; ++i) {
-      lever[i][0] = rows[i][1] * y[2] - rows[i][2] * y[1];
-      lever[i][1] = rows[i][2] * y[0] - rows[i][0] * y[2];
-      lever[i][2] = rows[i][0] * y[1] - rows[i][1] * y[0];
-    }
-    for (int i = 0; i < 6; ++i) translation_[i] += W[i];
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) coupling_[i][j] -= lever[i][j];
-    for (int i = 0, k = 0; i < 3; ++i)  // skew(y)^T lever
-      for (int j = i; j < 3; ++j, ++k)
-        rotation_[k] += y[(i + 2) % 3] * lever[(i + 1) % 3][j] - y[(i + 1) % 3] * lever[(i + 2) % 3][j];
-    for (int i = 0; i < 3; ++i) {
-      gradient_[i] -= g[i];
-      gradient_[3 + i] -= y[(i + 1) % 3] * g[(i + 2) % 3] - y[(i + 2) % 3] * g[(i + 1) % 3];
-    }
+    MatchLane weighted[6], CW[3][3], z[3], q[3], w[3], h[3], u[3], half[3];
+    each<6>([&](int i) CAIRN_INLINED { weighted[i] = weight * s.information[i]; });
+    const Packed W{weighted}, C{covariance};
+    const MatchLane inverse_depth = 1.0 / (axis[0] * y[0] + axis[1] * y[1] + axis[2] * y[2]);
+    each<3>([&](int i) CAIRN_INLINED { z[i] = inverse_depth * axis[i]; });
+    each<3>([&](int i) CAIRN_INLINED { q[i] = C(i, 0) * z[0] + C(i, 1) * z[1] + C(i, 2) * z[2]; });
+    each_entry([&](int i, int j)
+                   CAIRN_INLINED { CW[i][j] = C(i, 0) * W(0, j) + C(i, 1) * W(1, j) + C(i, 2) * W(2, j); });
+    const MatchLane c = z[0] * q[0] + z[1] * q[1] + z[2] * q[2], trace = CW[0][0] + CW[1][1] + CW[2][2];
+    each<3>([&](int i) CAIRN_INLINED {
+      w[i] = W(i, 0) * q[0] + W(i, 1) * q[1] + W(i, 2) * q[2];
+      half[i] = q[i] - 0.5 * c * y[i];
+    });
+    cross(y, z, h);
+    cross(y, w, u);
+    each<3>([&](int i)
+                CAIRN_INLINED { u[i] += CW[(i + 2) % 3][(i + 1) % 3] - CW[(i + 1) % 3][(i + 2) % 3]; });
+    MatchLane W_half[3][3], W_y[3][3], X[3][3];
+    times_skew(W, half, W_half);
+    times_skew(W, y, W_y);
+    skew_times(y, W_half, X);
+    each_entry([&](int i, int j) CAIRN_INLINED {
+      noise_.coupling[i][j] +=
+          W_half[i][j] - 0.5 * c * W_y[i][j] + (trace * z[i] + w[i]) * h[j] + z[i] * u[j];
+    });
+    each<6>([&](int k) CAIRN_INLINED {
+      const int i = row_of[k], j = column_of[k];
+      noise_.translation[k] += c * weighted[k] + trace * z[i] * z[j] + w[i] * z[j] + z[i] * w[j];
+      noise_.rotation[k] += trace * h[i] * h[j] + u[i] * h[j] + h[i] * u[j] - X[i][j] - X[j][i];
+      add_mixed_cofactor(W, C, i, j, noise_.rotation[k]);
+    });
   }
 
   /// Information matrix for right steps of a pose with rotation `R_world_camera`.
-  [[nodiscard]] Matrix<6> information(const Matrix<3>& R) const noexcept {
-    return assembled(translation_, rotation_, coupling_, R);
-  }
+  [[nodiscard]] Matrix<6> information(const Matrix<3>& R) const noexcept { return sums_.assembled(R); }
+
+  /// (4), the same way.
+  [[nodiscard]] Matrix<6> noise(const Matrix<3>& R) const noexcept { return noise_.assembled(R); }
 
   [[nodiscard]] Vector<6> gradient(const Matrix<3>& R) const noexcept {
     Vector<6> g;
@@ -78,90 +144,30 @@ public:
     return g;
   }
 
-  /// Adds to noise() what the landmarks' covariances C, in world axes, do to J, by (4). `axis` is the
-  /// camera's, in world axes.
-  [[gnu::always_inline]] void add_noise(const StereoStatistics& s, const MatchLane (&C)[6],
-                                        const MatchLane (&axis)[3], const MatchLane& weight) noexcept {
-    constexpr int packed[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
-    const MatchLane(&y)[3] = s.y;
-    const MatchLane inverse_depth = 1.0 / (axis[0] * y[0] + axis[1] * y[1] + axis[2] * y[2]);
-    MatchLane W[3][3], K[3][3], z[3], q[3], w[3], m[3], u[3], half[3];
-    for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) W[i][j] = weight * s.information[packed[i][j]];
-      z[i] = inverse_depth * axis[i];
-    }
-    for (int i = 0; i < 3; ++i) {
-      q[i] = C[packed[i][0]] * z[0] + C[packed[i][1]] * z[1] + C[packed[i][2]] * z[2];
-      for (int j = 0; j < 3; ++j)
-        K[i][j] = C[packed[i][0]] * W[0][j] + C[packed[i][1]] * W[1][j] + C[packed[i][2]] * W[2][j];
-    }
-    const MatchLane c = z[0] * q[0] + z[1] * q[1] + z[2] * q[2], trace = K[0][0] + K[1][1] + K[2][2];
-    for (int i = 0; i < 3; ++i) {
-      const int j = (i + 1) % 3, k = (i + 2) % 3;
-      w[i] = W[i][0] * q[0] + W[i][1] * q[1] + W[i][2] * q[2];
-      m[i] = y[j] * z[k] - y[k] * z[j];
-      half[i] = q[i] - 0.5 * c * y[i];
-    }
-    for (int i = 0; i < 3; ++i) {
-      const int j = (i + 1) % 3, k = (i + 2) % 3;
-      u[i] = y[j] * w[k] - y[k] * w[j] + K[k][j] - K[j][k];
-    }
-    MatchLane lever[3][3];  // W skew(q - c y / 2)
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j)
-        lever[i][j] = W[i][(j + 1) % 3] * half[(j + 2) % 3] - W[i][(j + 2) % 3] * half[(j + 1) % 3];
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) {
-        const int k = (j + 1) % 3, l = (j + 2) % 3;
-        noise_coupling_[i][j] += lever[i][j] - 0.5 * c * (W[i][k] * y[l] - W[i][l] * y[k]) +
-                                 (trace * z[i] + w[i]) * m[j] + z[i] * u[j];
-      }
-    MatchLane pulled[3][3];  // skew(y)^T lever
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j)
-        pulled[i][j] = y[(i + 2) % 3] * lever[(i + 1) % 3][j] - y[(i + 1) % 3] * lever[(i + 2) % 3][j];
-    for (int i = 0, n = 0; i < 3; ++i)
-      for (int j = i; j < 3; ++j, ++n) {
-        const int a = (i + 1) % 3, b = (i + 2) % 3, e = (j + 1) % 3, f = (j + 2) % 3;
-        const MatchLane cofactor = W[a][e] * C[packed[b][f]] + W[b][f] * C[packed[a][e]] -
-                                   W[a][f] * C[packed[b][e]] - W[b][e] * C[packed[a][f]];
-        noise_translation_[n] += c * W[i][j] + trace * z[i] * z[j] + w[i] * z[j] + z[i] * w[j];
-        noise_rotation_[n] +=
-            trace * m[i] * m[j] + u[i] * m[j] + m[i] * u[j] - pulled[i][j] - pulled[j][i] + cofactor;
-      }
-  }
-
-  /// (4) for right steps of a pose with rotation `R_world_camera`.
-  [[nodiscard]] Matrix<6> noise(const Matrix<3>& R) const noexcept {
-    return assembled(noise_translation_, noise_rotation_, noise_coupling_, R);
-  }
-
 private:
-  [[nodiscard]] static Matrix<6> assembled(const MatchLane (&translation)[6], const MatchLane (&rotation)[6],
-                                           const MatchLane (&coupling)[3][3], const Matrix<3>& R) noexcept {
-    Matrix<6> m;
-    for (int i = 0, k = 0; i < 3; ++i)
-      for (int j = i; j < 3; ++j, ++k) {
-        m(i, j) = m(j, i) = sum(translation[k]);
-        m(3 + i, 3 + j) = m(3 + j, 3 + i) = sum(rotation[k]);
-      }
-    for (int i = 0; i < 3; ++i)
-      for (int j = 0; j < 3; ++j) m(i, 3 + j) = m(3 + j, i) = sum(coupling[i][j]);
-    for (int i = 0; i < 6; i += 3)
-      for (int j = 0; j < 6; j += 3) put(m, i, j, transposed_product(R, product(part_of<3, 3>(m, i, j), R)));
-    return symmetrised(m);
-  }
+  static constexpr int row_of[6] = {0, 0, 0, 1, 1, 2}, column_of[6] = {0, 1, 2, 1, 2, 2};  // as Packed
 
-  MatchLane translation_[6] = {}, rotation_[6] = {}, coupling_[3][3] = {}, gradient_[6] = {};
-  MatchLane noise_translation_[6] = {}, noise_rotation_[6] = {}, noise_coupling_[3][3] = {};
+  struct alignas(MatchLane) Blocks {
+    MatchLane translation[6] = {}, rotation[6] = {}, coupling[3][3] = {};
+
+    [[nodiscard]] Matrix<6> assembled(const Matrix<3>& R) const noexcept {
+      const Packed upper{translation}, lower{rotation};
+      Matrix<6> m;
+      for (int i = 0; i < 3; ++i)
+        for (int j = 0; j < 3; ++j) {
+          m(i, j) = sum(upper(i, j));
+          m(3 + i, 3 + j) = sum(lower(i, j));
+          m(i, 3 + j) = m(3 + j, i) = sum(coupling[i][j]);
+        }
+      for (int i = 0; i < 6; i += 3)
+        for (int j = 0; j < 6; j += 3)
+          put(m, i, j, transposed_product(R, product(part_of<3, 3>(m, i, j), R)));
+      return symmetrised(m);
+    }
+  };
+
+  Blocks sums_, noise_;
+  MatchLane gradient_[6] = {};
 };
-
-/// Cholesky factor of an information matrix; nothing where a direction is undetermined given the others.
-[[nodiscard]] inline std::optional<Cholesky<6>> factor_information(const Matrix<6>& information) {
-  constexpr double least_share = 1e-10;  // of a direction's information that the others do not explain
-  const Cholesky<6> result(information);
-  if (!(result.good() && result.least_share() > least_share)) return std::nullopt;
-  return result;
-}
 
 }}}  // namespace cairn::CAIRN_ABI::detail

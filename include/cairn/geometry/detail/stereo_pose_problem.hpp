@@ -16,11 +16,11 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
-#include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/geometry/alignment.hpp>
 #include <cairn/geometry/detail/pose_equations.hpp>
+#include <cairn/geometry/detail/robust_pose.hpp>
 #include <cairn/geometry/detail/stereo_residual.hpp>
 #include <cairn/geometry/ransac.hpp>
 #include <cairn/geometry/robust_loss.hpp>
@@ -39,14 +39,8 @@ inline void check_start(const SE3& T_world_camera) {
 }
 
 inline void check_prior(const PosePrior& prior) {
-  constexpr double slack = 1e-6;  // more than rounding leaves of a product or an inverse
   check_start(prior.T_world_camera);
-  if (prior.information.isZero(0)) return;
-  Matrix<6> given = symmetrised(prior.information);
-  const bool symmetric =
-      (prior.information - given).cwiseAbs().maxCoeff() <= slack * given.cwiseAbs().maxCoeff();
-  given.diagonal() *= 1 + slack;
-  if (!all_finite(prior.information) || !symmetric || !is_semi_definite<6, double>(given))
+  if (!nearly_semi_definite(prior.information))
     raise("stereo pose: expected a prior information that is finite, symmetric and positive semi-definite");
 }
 
@@ -67,7 +61,10 @@ public:
         lanes_((matches.size() + match_lanes - 1) / match_lanes),
         gate_(chi_square_quantile(options.gate_probability, dof())) {
     CAIRN_EXPECTS(options.loss_scale > 0, "stereo pose: loss_scale is positive");
-    if (prior) check_prior(*prior);
+    if (prior) {
+      check_prior(*prior);
+      prior_->information = symmetrised(prior->information);
+    }
     for (std::size_t i = 0; i < matches.size(); ++i)
       prepare(matches[i], i, rig, options.right_rows, lanes_[i / match_lanes]);
   }
@@ -92,15 +89,28 @@ public:
     const Alignment start = align_points(source, target, weights);
     if (!start.good()) return false;
     pose = start.T_target_source;
-    constexpr double everything = std::numeric_limits<double>::max();
-    for (int step = 0; step < 2; ++step)
-      if (!newton_step(lanes, pose, everything, RobustLoss::none, 1)) return false;
+    constexpr Weighing all_alike{.gate = std::numeric_limits<double>::max()};
+    for (int i = 0; i < 2; ++i)
+      if (!step(lanes, pose, all_alike)) return false;
     return true;
   }
 
   [[nodiscard]] RansacScore score(const SE3& pose, double limit) const noexcept {
     const StereoView view(pose, rig_);
-    return with_avx2_lanes([&]() CAIRN_INLINED { return score_lanes(view, limit); });
+    return with_avx2_lanes([&]() CAIRN_INLINED {
+      MatchLane cost = {};  // less what the lanes without a match will add
+      cost[0] = -static_cast<double>(lanes_.size() * match_lanes - matches_.size()) * gate_;
+      decltype(cost < cost) inliers = {};
+      StereoStatistics s;
+      for (std::size_t i = 0; i < lanes_.size(); ++i) {
+        evaluate(lanes_[i], view, gate_, s);
+        const auto inside = s.chi_squared < gate_;
+        inliers -= inside;  // true is -1
+        cost += inside ? s.chi_squared : gate_ + MatchLane{};
+        if (i % 4 == 3 && sum(cost) > limit) break;
+      }
+      return RansacScore{sum(cost), static_cast<std::size_t>(sum(inliers))};
+    });
   }
 
   /// Local optimisation: one step that listens to a neighbourhood wider than the gate, one within it.
@@ -110,18 +120,19 @@ public:
 
   void inliers(const SE3& pose, std::span<std::uint8_t> mask) const noexcept {
     const StereoView view(pose, rig_);
-    StereoStatistics s;
-    for (std::size_t i = 0; i < mask.size(); ++i) {
-      if (i % match_lanes == 0) evaluate(lanes_[i / match_lanes], view, gate_, s);
-      mask[i] = s.chi_squared[i % match_lanes] < gate_;
-    }
+    with_avx2_lanes([&]() CAIRN_INLINED {
+      StereoStatistics s;
+      for (std::size_t i = 0; i < mask.size(); ++i) {
+        if (i % match_lanes == 0) evaluate(lanes_[i / match_lanes], view, gate_, s);
+        mask[i] = s.chi_squared[i % match_lanes] < gate_;
+      }
+    });
   }
 
   /// One reweighted Gauss-Newton step with all sigmas taken `widening` times as large, on the matches inside
   /// the gate: its length in standard deviations, squared, or nothing where the equations are degenerate.
   [[nodiscard]] std::optional<double> step(SE3& pose, double widening = 1) const {
-    return newton_step(lanes_, pose, gate_ * widening * widening, options_.loss,
-                       options_.loss_scale * widening);
+    return step(lanes_, pose, {gate_ * widening * widening, options_.loss, options_.loss_scale * widening});
   }
 
   /// A guess that may be off by tens of pixels, brought closer.
@@ -131,72 +142,43 @@ public:
     return pose;
   }
 
-  /// Information of the pose by the matches below the gate and the prior; nothing where a direction is left
+  /// What the matches below the gate and the prior tell of the pose; nothing where they leave a direction
   /// undetermined. The first part carries the efficiency of the loss and the gate.
   ///
   /// Where the noise of the landmarks may be most of what J^T W J holds of a direction, the information there
   /// is less: by the share that is expected to be noise, and by how much the cost does rise along it, the
   /// mean of both. Landmarks on a line that is not known exactly: J^T W J is sure of the turn about it, and
   /// the cost is level.
-  [[nodiscard]] std::optional<Matrix<6>> information(const SE3& pose) const {
+  [[nodiscard]] std::optional<Certainty> certainty(const SE3& pose) const {
     constexpr double suspect = 0.1;  // share of noise in J^T W J: more than that is looked into
     constexpr double least = 0.25;   // of J^T W J that is left
     const double efficiency =
         robust_efficiency(options_.loss, options_.loss_scale, options_.gate_probability, gate_, dof());
-    PoseEquations equations;
-    const StereoView view(pose, rig_);
-    with_avx2_lanes([&]() CAIRN_INLINED { judge_lanes(view, equations); });
+    const PoseEquations of_lanes = linearise(lanes_, pose, {gate_}, noise_stride());
     const Matrix<3> R = pose.rotation().matrix();
-    const Matrix<6> of_matches = efficiency * equations.information(R);
-    Matrix<6> information = of_matches;
-    Vector<6> unused = Vector<6>::Zero();
-    add_prior(pose, information, unused);
-    const auto factor = factor_information(information);
+    const Matrix<6> of_matches = efficiency * of_lanes.information(R);
+    NormalEquations equations{of_matches};
+    add_prior(pose, equations);
+    const auto factor = factor_information(equations.information);
     if (!factor) return std::nullopt;
-    const auto [d, share] = noisiest_direction(
-        information, *factor, efficiency * static_cast<double>(noise_stride()) * equations.noise(R));
-    if (!(share > suspect)) return information;
+    Certainty result{equations.information, factor->inverse()};
+    const auto [d, share] =
+        noisiest_direction(result, efficiency * static_cast<double>(noise_stride()) * of_lanes.noise(R));
+    if (!(share > suspect)) return result;
     const double of_prior = 1 - d.dot(of_matches * d);
     const double left = 0.5 * (1 - share + efficiency * rise(pose, d) + of_prior);
     if (!(left > least)) return std::nullopt;
-    const Vector<6> along = information * d;
-    if (left < 1) information -= symmetrised(Matrix<6>((1 - left) * along * along.transpose()));
-    return information;
+    if (left < 1) {  // of what is known along d, one standard deviation long, that share
+      const Vector<6> along = result.information * d;
+      result.information -= symmetrised(Matrix<6>((1 - left) * along * along.transpose()));
+      result.covariance += symmetrised(Matrix<6>((1 / left - 1) * d * d.transpose()));
+    }
+    return result;
   }
 
 private:
   // Independent coordinates of a residual.
   [[nodiscard]] int dof() const noexcept { return options_.right_rows ? 4 : 3; }
-
-  [[gnu::always_inline]] RansacScore score_lanes(const StereoView& view, double limit) const noexcept {
-    MatchLane cost = {};  // less what the lanes without a match will add
-    cost[0] = -static_cast<double>(lanes_.size() * match_lanes - matches_.size()) * gate_;
-    decltype(cost < cost) inliers = {};
-    StereoStatistics s;
-    for (std::size_t i = 0; i < lanes_.size(); ++i) {
-      evaluate(lanes_[i], view, gate_, s);
-      const auto inside = s.chi_squared < gate_;
-      inliers -= inside;  // true is -1
-      cost += inside ? s.chi_squared : gate_ + MatchLane{};
-      if (i % 4 == 3 && sum(cost) > limit) break;
-    }
-    return {sum(cost), static_cast<std::size_t>(sum(inliers))};
-  }
-
-  [[gnu::always_inline]] void linearise_lanes(std::span<const MatchLanes> matches, const StereoView& view,
-                                              double gate, RobustLoss loss, double loss_scale,
-                                              PoseEquations& equations) const noexcept {
-    StereoStatistics s;
-    for (const MatchLanes& m : matches) {
-      if (!evaluate(m, view, gate, s)) continue;
-      MatchLane weight;
-      for (std::size_t lane = 0; lane < match_lanes; ++lane) {
-        const double chi_squared = s.chi_squared[lane];
-        weight[lane] = chi_squared < gate ? robust_weight(loss, loss_scale, chi_squared) : 0;
-      }
-      equations.add(s, weight);
-    }
-  }
 
   // What share of the equations is noise is known well enough from every so many matches.
   [[nodiscard]] std::size_t noise_stride() const noexcept {
@@ -204,18 +186,52 @@ private:
     return std::max<std::size_t>(1, lanes_.size() / enough);
   }
 
-  [[gnu::always_inline]] void judge_lanes(const StereoView& view, PoseEquations& equations) const noexcept {
-    const MatchLane axis[3] = {view.left[6], view.left[7], view.left[8]};
-    const std::size_t stride = noise_stride();
-    StereoStatistics s;
-    for (std::size_t i = 0; i < lanes_.size(); ++i) {
-      const MatchLanes& m = lanes_[i];
-      if (!evaluate(m, view, gate_, s)) continue;
-      MatchLane weight;
-      for (std::size_t lane = 0; lane < match_lanes; ++lane) weight[lane] = s.chi_squared[lane] < gate_;
-      equations.add(s, weight);
-      if (i % stride == 0) equations.add_noise(s, m.covariance, axis, weight);
+  // What a match counts: nothing from the gate on.
+  struct Weighing {
+    double gate;
+    RobustLoss loss = RobustLoss::none;
+    double loss_scale = 1;
+    [[nodiscard]] double operator()(double chi_squared) const noexcept {
+      return chi_squared < gate ? robust_weight(loss, loss_scale, chi_squared) : 0;
     }
+  };
+
+  // With noise() too, of every so many matches, where the stride is not 0.
+  [[nodiscard]] PoseEquations linearise(std::span<const MatchLanes> matches, const SE3& pose,
+                                        const Weighing& weighing,
+                                        std::size_t noise_stride = 0) const noexcept {
+    const StereoView view(pose, rig_);
+    const MatchLane axis[3] = {view.left[6], view.left[7], view.left[8]};
+    PoseEquations equations;
+    with_avx2_lanes([&]() CAIRN_INLINED {
+      StereoStatistics s;
+      for (std::size_t i = 0; i < matches.size(); ++i) {
+        if (!evaluate(matches[i], view, weighing.gate, s)) continue;
+        MatchLane weight;
+        for (std::size_t lane = 0; lane < match_lanes; ++lane) weight[lane] = weighing(s.chi_squared[lane]);
+        equations.add(s, weight);
+        if (noise_stride != 0 && i % noise_stride == 0)
+          equations.add_noise(s, matches[i].covariance, axis, weight);
+      }
+    });
+    return equations;
+  }
+
+  [[nodiscard]] std::optional<double> step(std::span<const MatchLanes> matches, SE3& pose,
+                                           const Weighing& weighing) const {
+    const PoseEquations of_lanes = linearise(matches, pose, weighing);
+    const Matrix<3> R = pose.rotation().matrix();
+    NormalEquations equations{of_lanes.information(R), of_lanes.gradient(R)};
+    add_prior(pose, equations);
+    return newton_step(equations, pose);
+  }
+
+  void add_prior(const SE3& pose, NormalEquations& equations) const {
+    if (!prior_ || prior_->information.isZero(0)) return;
+    const Vector<6> error = local(prior_->T_world_camera, pose);
+    const Matrix<6> J = SE3::right_jacobian_inverse(error);
+    equations.information += symmetrised(transposed_product(J, product(prior_->information, J)));
+    equations.gradient -= transposed_product(J, product(prior_->information, error));
   }
 
   struct Direction {
@@ -224,16 +240,15 @@ private:
   };
 
   // By power iteration: how sharply it is met decides nothing.
-  [[nodiscard]] static Direction noisiest_direction(const Matrix<6>& information, const Cholesky<6>& factor,
-                                                    const Matrix<6>& noise) noexcept {
+  [[nodiscard]] static Direction noisiest_direction(const Certainty& of, const Matrix<6>& noise) noexcept {
     constexpr int rounds = 12;
     Direction result{Vector<6>::Ones()};
     for (int i = 0; i < rounds; ++i) {
-      result.step /= std::sqrt(result.step.dot(information * result.step));
+      result.step /= std::sqrt(result.step.dot(of.information * result.step));
       const Vector<6> pulled = noise * result.step;
       result.share = result.step.dot(pulled);
       if (!(result.share > 0)) return result;
-      if (i + 1 < rounds) result.step = factor.solve(pulled);
+      if (i + 1 < rounds) result.step = of.covariance * pulled;
     }
     return result;
   }
@@ -255,36 +270,6 @@ private:
                  s.chi_squared[lane];
     }
     return sum;
-  }
-
-  void linearise(std::span<const MatchLanes> matches, const SE3& pose, double gate, RobustLoss loss,
-                 double loss_scale, PoseEquations& equations) const noexcept {
-    const StereoView view(pose, rig_);
-    with_avx2_lanes([&]()
-                        CAIRN_INLINED { linearise_lanes(matches, view, gate, loss, loss_scale, equations); });
-  }
-
-  [[nodiscard]] std::optional<double> newton_step(std::span<const MatchLanes> matches, SE3& pose, double gate,
-                                                  RobustLoss loss, double loss_scale) const {
-    PoseEquations equations;
-    linearise(matches, pose, gate, loss, loss_scale, equations);
-    const Matrix<3> R = pose.rotation().matrix();
-    Matrix<6> information = equations.information(R);
-    Vector<6> gradient = equations.gradient(R);
-    add_prior(pose, information, gradient);
-    const auto factor = factor_information(information);
-    if (!factor) return std::nullopt;
-    const Vector<6> d = factor->solve(gradient);
-    pose = retract(pose, d);
-    return d.dot(gradient);
-  }
-
-  void add_prior(const SE3& pose, Matrix<6>& information, Vector<6>& gradient) const {
-    if (!prior_ || prior_->information.isZero(0)) return;
-    const Vector<6> error = local(prior_->T_world_camera, pose);
-    const Matrix<6> J = SE3::right_jacobian_inverse(error);
-    information += symmetrised(transposed_product(J, product(prior_->information, J)));
-    gradient -= transposed_product(J, product(prior_->information, error));
   }
 
   // Sine of the smallest angle of the triangle below 0.02, or a side of no length.

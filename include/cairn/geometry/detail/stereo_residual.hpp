@@ -28,9 +28,11 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/geometry/camera.hpp>
+#include <cairn/geometry/detail/robust_pose.hpp>
 #include <cairn/geometry/stereo_match.hpp>
 #include <cairn/geometry/stereo_rig.hpp>
 #include <cairn/manifold/se3.hpp>
+#include <cairn/simd/processor.hpp>
 #include <cairn/simd/registers.hpp>
 #include <cairn/version.hpp>
 
@@ -111,7 +113,7 @@ struct alignas(MatchLane) StereoResidual {
   const MatchLane inverse = 1.0 / p[2], x = p[0] * inverse, y = p[1] * inverse;
   const MatchLane ex = o.x - x, ey = o.y - y;
   const MatchLane w[2][2] = {{o.xx, o.xy}, {o.yx, o.yy}};
-  for (int i = 0; i < 2; ++i) {
+  each<2>([&](int i) CAIRN_INLINED {
     const MatchLane r = w[i][0] * ex + w[i][1] * ey;
     const MatchLane j0 = w[i][0] * inverse, j1 = w[i][1] * inverse, j2 = -(j0 * x + j1 * y);
     const MatchLane a = j0 * R[0] + j1 * R[3] + j2 * R[6];
@@ -127,7 +129,7 @@ struct alignas(MatchLane) StereoResidual {
     s.b[0] += r * a;
     s.b[1] += r * b;
     s.b[2] += r * c;
-  }
+  });
 }
 
 /// (1) to (4) for a landmark with covariance C; turns the residual's A and b into information and gradient.
@@ -148,7 +150,8 @@ struct alignas(MatchLane) StereoResidual {
   const MatchLane G[3][3] = {{c00 * scale, (m02 * m21 - m01 * m22) * scale, (m01 * m12 - m02 * m11) * scale},
                              {c01 * scale, (m00 * m22 - m02 * m20) * scale, (m02 * m10 - m00 * m12) * scale},
                              {c02 * scale, (m01 * m20 - m00 * m21) * scale, (m00 * m11 - m01 * m10) * scale}};
-  for (int i = 0; i < 3; ++i) s.gradient[i] = G[i][0] * r.b[0] + G[i][1] * r.b[1] + G[i][2] * r.b[2];
+  each<3>([&](int i)
+              CAIRN_INLINED { s.gradient[i] = G[i][0] * r.b[0] + G[i][1] * r.b[1] + G[i][2] * r.b[2]; });
   s.information[0] = G[0][0] * A[0] + G[0][1] * A[1] + G[0][2] * A[2];
   s.information[1] = G[0][0] * A[1] + G[0][1] * A[3] + G[0][2] * A[4];
   s.information[2] = G[0][0] * A[2] + G[0][1] * A[4] + G[0][2] * A[5];
@@ -177,12 +180,12 @@ using LaneMask = decltype(MatchLane{} < MatchLane{});
 [[gnu::always_inline]] inline bool evaluate(const MatchLanes& m, const StereoView& view, double gate,
                                             StereoStatistics& s) noexcept {
   MatchLane p[3], q[3];
-  for (int i = 0; i < 3; ++i) s.y[i] = m.landmark[i] - view.camera[i];
+  each<3>([&](int i) CAIRN_INLINED { s.y[i] = m.landmark[i] - view.camera[i]; });
   const MatchLane *L = view.left, *R = view.right, *y = s.y;
-  for (int i = 0; i < 3; ++i) {
+  each<3>([&](int i) CAIRN_INLINED {
     p[i] = y[0] * L[3 * i] + y[1] * L[3 * i + 1] + y[2] * L[3 * i + 2];
     q[i] = y[0] * R[3 * i] + y[1] * R[3 * i + 1] + y[2] * R[3 * i + 2] + view.t_right_left[i];
-  }
+  });
   LaneMask seen = m.usable > 0.0;
   keep_in_sight(p, view.nearest, seen);
   keep_in_sight(q, view.nearest, seen);
@@ -209,7 +212,7 @@ using LaneMask = decltype(MatchLane{} < MatchLane{});
 
 inline void check_match(const StereoMatch& m, std::size_t index) {
   if (!all_finite(m.landmark)) refuse_match(index, "a finite landmark position");
-  if (!all_finite(m.covariance) || !may_be_covariance(m.covariance))
+  if (!nearly_semi_definite(m.covariance))
     refuse_match(index, "a landmark covariance: finite, symmetric, positive semi-definite");
   if (!all_finite(m.left) || !all_finite(m.right)) refuse_match(index, "finite pixels");
   if (!(m.sigma_left > 0 && m.sigma_right > 0 && std::isfinite(m.sigma_left) && std::isfinite(m.sigma_right)))
