@@ -1,4 +1,4 @@
-# The release archive tests itself on a machine without doctest.
+# The release archive tests itself on a machine without doctest: with the folder of tests that takes least to compile.
 include("${CMAKE_CURRENT_LIST_DIR}/steps.cmake")
 find_program(git git)
 if(NOT git OR NOT EXISTS "${source}/.git")
@@ -9,5 +9,5 @@ configure("${source}" "${work}/cairn" -D CAIRN_BUILD_EXAMPLES=OFF)
 run("${CMAKE_COMMAND}" --build "${work}/cairn" --target package_source)
 run("${CMAKE_COMMAND}" -E chdir "${work}" "${CMAKE_COMMAND}" -E tar xf "${work}/cairn/cairn-${version}.tar.gz")
 configure("${work}/cairn-${version}" "${work}/self" -D CAIRN_BUILD_EXAMPLES=OFF -D CMAKE_DISABLE_FIND_PACKAGE_doctest=ON)
-run("${CMAKE_COMMAND}" --build "${work}/self" --target core_tests)
-run("${CMAKE_CTEST_COMMAND}" --test-dir "${work}/self" --output-on-failure -R "^core_")
+run("${CMAKE_COMMAND}" --build "${work}/self" --target simd_tests)
+run("${CMAKE_CTEST_COMMAND}" --test-dir "${work}/self" --output-on-failure --no-tests=error -R "^simd_")
