@@ -19,20 +19,6 @@ using cairn::Matrix;
 using cairn::SE2;
 using cairn::Vector;
 
-/// The next frame of a reading's path, its sightings of what is likeliest.
-void go_on(Reading& reading, const LandmarkLog& log, const SE2& pose) {
-  const Frame& frame = log.frames[reading.poses.size()];
-  const SE2 before = reading.poses.empty() ? SE2() : reading.poses.back();
-  const cairn::Gaussian<SE2> motion{before * frame.moved.mean, frame.moved.covariance};
-  auto association =
-      reading.map.likeliest(reading.map.candidates({pose, Matrix<3>::Zero()}, frame.seen)).choice;
-  reading.log_density +=
-      cairn::log_density(motion, pose) + reading.map.log_likelihood(pose, frame.seen, association);
-  reading.map.insert(pose, frame.seen, association);
-  reading.poses.push_back(pose);
-  reading.associations.push_back(std::move(association));
-}
-
 /// A frame before which the motion is so uncertain that a landmark can be mistaken for its neighbour.
 struct Gap {
   std::size_t frame = 0;
@@ -99,15 +85,28 @@ std::vector<SE2> moves_onto(const Map& map, const std::vector<Vector<2>>& places
 
 }  // namespace
 
+cairn::Association Walk::likeliest(const LandmarkLog& log, const SE2& next) const {
+  return map.likeliest(map.candidates({next, Matrix<3>::Zero()}, log.frames[frames].seen)).choice;
+}
+
+void Walk::go_on(const LandmarkLog& log, const SE2& next, const cairn::Association& association) {
+  const Frame& frame = log.frames[frames++];
+  const cairn::Gaussian<SE2> motion{pose * frame.moved.mean, frame.moved.covariance};
+  pose = next;
+  log_density += cairn::log_density(motion, pose) + map.log_likelihood(pose, frame.seen, association);
+  map.insert(pose, frame.seen, association);
+}
+
 std::vector<cairn::Association> associations_along(const LandmarkLog& log, const LandmarkLog& believed,
-                                                   const std::vector<SE2>& poses, Map map) {
+                                                   const std::vector<SE2>& poses, const Map& empty) {
   std::vector<cairn::Association> all;
+  Walk walk{empty};
   for (std::size_t k = 0; k < poses.size(); ++k) {
+    all.push_back(walk.likeliest(log, poses[k]));
     const auto& seen = log.frames[k].seen;
-    all.push_back(map.likeliest(map.candidates({poses[k], Matrix<3>::Zero()}, seen)).choice);
     for (std::size_t i = 0; i < seen.size(); ++i)
       if (seen[i].identity && !believed.frames[k].seen[i].identity) all.back()[i] = cairn::no_landmark;
-    map.insert(poses[k], seen, all.back());
+    walk.go_on(log, poses[k], all.back());
   }
   return all;
 }
@@ -158,15 +157,19 @@ std::optional<std::vector<cairn::Association>> merged(std::vector<cairn::Associa
 std::vector<Reading> rereadings(const LandmarkLog& log, const std::vector<SE2>& poses, const Map& empty,
                                 unsigned threads, std::size_t most) {
   struct Other {
-    Reading begun;  // until the gap
+    Walk walk;  // until the gap, then on
     SE2 move;
+    std::vector<cairn::Association> after;  // the gap
   };
   std::vector<Other> others;
-  Reading along{.poses = {}, .associations = {}, .map = empty};
+  Walk along{empty};
+  std::vector<cairn::Association> associations;
   std::vector<double> log_densities;  // along the path as it stands, after each frame
   const auto stand_still = [&](std::size_t until) {
-    while (along.poses.size() < until) {
-      go_on(along, log, poses[along.poses.size()]);
+    while (along.frames < until) {
+      const SE2& pose = poses[along.frames];
+      associations.push_back(along.likeliest(log, pose));
+      along.go_on(log, pose, associations.back());
       log_densities.push_back(along.log_density);
     }
   };
@@ -174,27 +177,35 @@ std::vector<Reading> rereadings(const LandmarkLog& log, const std::vector<SE2>& 
     stand_still(gap.frame);
     const std::vector<Vector<2>> places = first_seen(log, poses, gap.frame);
     if (places.empty()) continue;
-    for (const SE2& move : moves_onto(along.map, places, gap)) others.push_back({along, move});
+    for (const SE2& move : moves_onto(along.map, places, gap)) others.push_back({along, move, {}});
   }
   stand_still(poses.size());
   constexpr double hopeless = 60;  // so far behind the path as it stands, a reading is given up
   cairn::parallel_for(others.size(), threads, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
-      Reading& reading = others[i].begun;
-      while (reading.poses.size() < poses.size()) {
-        const std::size_t k = reading.poses.size();
-        go_on(reading, log, others[i].move * poses[k]);
-        if (reading.log_density < log_densities[k] - hopeless) break;
+      auto& [walk, move, after] = others[i];
+      while (walk.frames < poses.size()) {
+        const SE2 pose = move * poses[walk.frames];
+        after.push_back(walk.likeliest(log, pose));
+        walk.go_on(log, pose, after.back());
+        if (walk.log_density < log_densities[walk.frames - 1] - hopeless) break;
       }
     }
   });
-  std::erase_if(others, [&](const Other& o) { return o.begun.poses.size() < poses.size(); });
+  std::erase_if(others, [&](const Other& o) { return o.walk.frames < poses.size(); });
   std::vector<std::pair<double, std::size_t>> best;
-  for (std::size_t i = 0; i < others.size(); ++i) best.emplace_back(-others[i].begun.log_density, i);
+  for (std::size_t i = 0; i < others.size(); ++i) best.emplace_back(-others[i].walk.log_density, i);
   std::ranges::sort(best);
   std::vector<Reading> result;
-  for (std::size_t i = 0; i < std::min(most, best.size()); ++i)
-    result.push_back(std::move(others[best[i].second].begun));
+  for (std::size_t i = 0; i < std::min(most, best.size()); ++i) {
+    auto& [walk, move, after] = others[best[i].second];
+    Reading& reading = result.emplace_back(Reading{poses, associations, walk.log_density});
+    const std::size_t gap = poses.size() - after.size();
+    for (std::size_t k = gap; k < poses.size(); ++k) {
+      reading.poses[k] = move * poses[k];
+      reading.associations[k] = std::move(after[k - gap]);
+    }
+  }
   return result;
 }
 

@@ -17,21 +17,32 @@
 
 namespace fastslam {
 
-/// A path with what its sightings are of, its map, and what the particles' own model says of it, log p(x_1:t,
-/// n_1:t, z_1:t).
+/// A path as it is gone frame by frame: its map, and what the particles' own model says of it so far,
+/// log p(x_1:t, n_1:t, z_1:t).
+struct Walk {
+  Map map;  ///< empty, before the first frame
+  double log_density = 0;
+  std::size_t frames = 0;
+  cairn::SE2 pose{};  ///< the newest, or the start
+
+  /// What the next frame's sightings are likeliest of, seen from this pose.
+  [[nodiscard]] cairn::Association likeliest(const LandmarkLog& log, const cairn::SE2& next) const;
+  void go_on(const LandmarkLog& log, const cairn::SE2& next, const cairn::Association& association);
+};
+
+/// A path with what its sightings are of, and how likely that is.
 struct Reading {
   std::vector<cairn::SE2> poses;
   std::vector<cairn::Association> associations;
-  Map map;
   double log_density = 0;
 };
 
 /// Which landmarks the sightings along a path are of: by their names, or the likeliest at each pose in turn.
-/// Names that `believed` has lost are of nothing. The map is empty.
+/// Names that `believed` has lost are of nothing.
 [[nodiscard]] std::vector<cairn::Association> associations_along(const LandmarkLog& log,
                                                                  const LandmarkLog& believed,
                                                                  const std::vector<cairn::SE2>& poses,
-                                                                 Map map);
+                                                                 const Map& empty);
 
 /// Names the sightings of the log's first frames by these associations, as a map numbers its landmarks.
 [[nodiscard]] LandmarkLog named(const LandmarkLog& log, const std::vector<cairn::Association>& associations);

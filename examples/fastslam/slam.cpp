@@ -70,24 +70,15 @@ std::size_t unnamed_in(const LandmarkLog& log) {
   return count;
 }
 
-/// What the particles' own model says of a path: its map, and log p(x_1:t, n_1:t, z_1:t).
+/// A path and what it was like to go along it.
 struct Replayed {
   std::vector<SE2> poses;
-  Map map;
-  double log_density = 0;
+  Walk walk;
 };
 Replayed replayed(const LandmarkLog& log, const std::vector<cairn::Association>& associations,
-                  std::vector<SE2> poses, Map map) {
-  Replayed r{std::move(poses), std::move(map)};
-  SE2 before;
-  for (std::size_t k = 0; k < r.poses.size(); ++k) {
-    const Frame& frame = log.frames[k];
-    const cairn::Gaussian<SE2> motion{before * frame.moved.mean, frame.moved.covariance};
-    before = r.poses[k];
-    r.log_density +=
-        cairn::log_density(motion, before) + r.map.log_likelihood(before, frame.seen, associations[k]);
-    r.map.insert(before, frame.seen, associations[k]);
-  }
+                  std::vector<SE2> poses, const Map& empty) {
+  Replayed r{std::move(poses), {empty}};
+  for (std::size_t k = 0; k < r.poses.size(); ++k) r.walk.go_on(log, r.poses[k], associations[k]);
   return r;
 }
 
@@ -187,7 +178,7 @@ private:
     PathDensity density(part, std::move(optimum));
     const std::vector<SE2>& poses = density.optimum().poses;
     const double log_evidence =
-        replayed(log_, associations, poses, empty_).log_density - density.log_density(poses);
+        replayed(log_, associations, poses, empty_).walk.log_density - density.log_density(poses);
     return {std::move(associations), std::move(density), log_evidence};
   }
   std::vector<Names> names_of(const Belief& belief, std::vector<SE2> start) {
@@ -263,7 +254,7 @@ private:
       const Names& best = **std::ranges::max_element(all, {}, log_share);
       const std::vector<SE2>& path = best.density.optimum().poses;
       auto readings = rereadings(log_, path, empty_, options_.threads, 8);
-      for (auto& associations : mergings(best)) readings.push_back({path, std::move(associations), empty_});
+      for (auto& associations : mergings(best)) readings.push_back({path, std::move(associations)});
       std::erase_if(readings, [&](const Reading& r) { return r.associations == best.associations; });
       if (readings.empty()) return;
       std::vector<std::optional<Names>> mended(readings.size());
@@ -296,7 +287,7 @@ private:
   Moving moving(std::size_t names, std::vector<double> white) const {
     const auto& [associations, density, log_share] = names_[names];
     auto replay = std::make_shared<const Replayed>(replayed(log_, associations, density.path(white), empty_));
-    const double log_ratio = replay->log_density - density.log_density(replay->poses) - log_share;
+    const double log_ratio = replay->walk.log_density - density.log_density(replay->poses) - log_share;
     return {names, std::move(white), std::move(replay), log_ratio};
   }
 
@@ -362,7 +353,7 @@ private:
       for (std::size_t k = 0; k < frames_; ++k) add(all_[i].replayed->poses[k], k + 1);
       const double log_weight = log_weights[i] - total;
       record.particles.push_back({parent, log_weight, log_weight, 0});
-      maps.push_back(all_[i].replayed->map);
+      maps.push_back(all_[i].replayed->walk.map);
     }
     return {record, std::move(maps)};
   }
