@@ -223,6 +223,7 @@ PathDensity::PathDensity(const LandmarkLog& log, BatchOptimum at) {
   equations_ = std::move(equations);
 }
 PathDensity::PathDensity(PathDensity&&) noexcept = default;
+PathDensity& PathDensity::operator=(PathDensity&&) noexcept = default;
 PathDensity::~PathDensity() = default;
 
 const BatchOptimum& PathDensity::optimum() const noexcept {

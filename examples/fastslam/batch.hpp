@@ -52,6 +52,7 @@ public:
   /// Throws cairn::Error where the optimum's equations are singular.
   PathDensity(const LandmarkLog& log, BatchOptimum at);
   PathDensity(PathDensity&&) noexcept;
+  PathDensity& operator=(PathDensity&&) noexcept;
   ~PathDensity();
 
   [[nodiscard]] const BatchOptimum& optimum() const noexcept;

@@ -28,6 +28,11 @@ struct Frame {
   double time = 0;                      ///< [s]
   cairn::Gaussian<cairn::SE2> moved{};  ///< since the frame before, by odometry, as seen from there
   Map::Observation seen{};
+
+  /// Of the pose, from that of the frame before.
+  [[nodiscard]] cairn::Gaussian<cairn::SE2> motion_from(const cairn::SE2& before) const {
+    return {before * moved.mean, moved.covariance};
+  }
 };
 
 /// A pose that odometry gives between two frames.

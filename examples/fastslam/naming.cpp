@@ -91,10 +91,17 @@ cairn::Association Walk::likeliest(const LandmarkLog& log, const SE2& next) cons
 
 void Walk::go_on(const LandmarkLog& log, const SE2& next, const cairn::Association& association) {
   const Frame& frame = log.frames[frames++];
-  const cairn::Gaussian<SE2> motion{pose * frame.moved.mean, frame.moved.covariance};
+  log_density +=
+      cairn::log_density(frame.motion_from(pose), next) + map.log_likelihood(next, frame.seen, association);
+  map.insert(next, frame.seen, association);
   pose = next;
-  log_density += cairn::log_density(motion, pose) + map.log_likelihood(pose, frame.seen, association);
-  map.insert(pose, frame.seen, association);
+}
+
+Walk walked(const LandmarkLog& log, const std::vector<SE2>& poses,
+            const std::vector<cairn::Association>& associations, const Map& empty) {
+  Walk walk{empty};
+  for (std::size_t k = 0; k < poses.size(); ++k) walk.go_on(log, poses[k], associations[k]);
+  return walk;
 }
 
 std::vector<cairn::Association> associations_along(const LandmarkLog& log, const LandmarkLog& believed,
@@ -107,6 +114,32 @@ std::vector<cairn::Association> associations_along(const LandmarkLog& log, const
     for (std::size_t i = 0; i < seen.size(); ++i)
       if (seen[i].identity && !believed.frames[k].seen[i].identity) all.back()[i] = cairn::no_landmark;
     walk.go_on(log, poses[k], all.back());
+  }
+  return all;
+}
+
+std::vector<cairn::Association> reassigned(const LandmarkLog& log, const std::vector<SE2>& poses,
+                                           const std::vector<cairn::Association>& associations,
+                                           const Map& empty) {
+  constexpr std::uint32_t unnumbered = cairn::no_landmark;
+  const Map map = walked(log, poses, associations, empty).map;
+  std::uint32_t numbers = 0, begun = 0;
+  std::vector<std::uint32_t> number_of(map.size(), unnumbered);  // by that in the map
+  std::vector<cairn::Association> all;
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    cairn::Association before = associations[k];
+    for (std::uint32_t& n : before)
+      if (n == cairn::new_landmark) n = numbers++;
+    auto& now = all.emplace_back(
+        map.likeliest(map.candidates({poses[k], Matrix<3>::Zero()}, log.frames[k].seen)).choice);
+    if (std::ranges::any_of(now, [&](std::uint32_t n) { return n >= map.size(); })) now = std::move(before);
+    for (std::uint32_t& n : now) {
+      if (n == cairn::no_landmark) continue;
+      std::uint32_t& number = number_of[n];
+      const bool is_new = number == unnumbered;
+      if (is_new) number = begun++;
+      n = is_new ? cairn::new_landmark : number;
+    }
   }
   return all;
 }

@@ -30,6 +30,10 @@ struct Walk {
   void go_on(const LandmarkLog& log, const cairn::SE2& next, const cairn::Association& association);
 };
 
+/// All the way along a path whose sightings are of these landmarks.
+[[nodiscard]] Walk walked(const LandmarkLog& log, const std::vector<cairn::SE2>& poses,
+                          const std::vector<cairn::Association>& associations, const Map& empty);
+
 /// A path with what its sightings are of, and how likely that is.
 struct Reading {
   std::vector<cairn::SE2> poses;
@@ -43,6 +47,14 @@ struct Reading {
                                                                  const LandmarkLog& believed,
                                                                  const std::vector<cairn::SE2>& poses,
                                                                  const Map& empty);
+
+/// What the sightings along a path whose landmarks have been named so are of by what is known of these at its
+/// end, numbered as a map would; no others are begun. Along the path a landmark that has been seen once is
+/// easily taken for its neighbour.
+[[nodiscard]] std::vector<cairn::Association> reassigned(const LandmarkLog& log,
+                                                         const std::vector<cairn::SE2>& poses,
+                                                         const std::vector<cairn::Association>& associations,
+                                                         const Map& empty);
 
 /// Names the sightings of the log's first frames by these associations, as a map numbers its landmarks.
 [[nodiscard]] LandmarkLog named(const LandmarkLog& log, const std::vector<cairn::Association>& associations);

@@ -9,7 +9,6 @@
 #include <memory>
 #include <numeric>
 #include <optional>
-#include <tuple>
 #include <utility>
 
 #include <cairn/core/check.hpp>
@@ -19,6 +18,7 @@
 #include <cairn/filter/conditional.hpp>
 
 #include "batch.hpp"
+#include "names.hpp"
 #include "naming.hpp"
 
 namespace fastslam {
@@ -32,9 +32,7 @@ using cairn::Vector;
 
 cairn::MappingStep step(const cairn::ConditionalFilter& filter, Belief& belief, const Frame& frame,
                         ProposalKind kind) {
-  const auto motion = [&](const SE2& x, std::size_t) {
-    return cairn::Gaussian<SE2>{x * frame.moved.mean, frame.moved.covariance};
-  };
+  const auto motion = [&](const SE2& x, std::size_t) { return frame.motion_from(x); };
   return kind == ProposalKind::motion ? filter.step(belief, motion, cairn::FromMotion{}, frame.seen)
                                       : filter.step(belief, motion, cairn::FromLandmarks{}, frame.seen);
 }
@@ -75,12 +73,6 @@ struct Replayed {
   std::vector<SE2> poses;
   Walk walk;
 };
-Replayed replayed(const LandmarkLog& log, const std::vector<cairn::Association>& associations,
-                  std::vector<SE2> poses, const Map& empty) {
-  Replayed r{std::move(poses), {empty}};
-  for (std::size_t k = 0; k < r.poses.size(); ++k) r.walk.go_on(log, r.poses[k], associations[k]);
-  return r;
-}
 
 /// A path that is being moved: the numbers that PathDensity makes it of, and how it is weighed.
 struct Moving {
@@ -128,12 +120,12 @@ double next_power(const std::vector<Moving>& all, double power, double least) {
 class Redrawing {
 public:
   Redrawing(const Belief& belief, const LandmarkLog& log, const SlamOptions& options,
-            std::vector<SE2>& optimum)
+            std::vector<SE2>& optimum, OtherNames& others)
       : log_(log),
         options_(options),
         frames_(belief.steps()),
         empty_(log.sensor, options.landmarks),
-        names_(names_of(belief, optimum)),
+        names_(names_of(belief, optimum, others)),
         all_(belief.size()) {
     optimum = std::ranges::max_element(names_, {}, &Names::log_share)->density.optimum().poses;
   }
@@ -163,25 +155,8 @@ public:
   }
 
 private:
-  /// Which landmarks were seen along the log, and the Gaussian about the path that this makes likeliest.
-  struct Names {
-    std::vector<cairn::Association> associations;
-    PathDensity density;
-    double log_share;  ///< of the names among all that are looked at, the path integrated out
-  };
-  Names named_so(std::vector<cairn::Association> associations, const std::vector<SE2>& start) const {
-    const LandmarkLog part = named(log_, associations);
-    return named_so(std::move(associations), part, batch_optimum(part, start));
-  }
-  Names named_so(std::vector<cairn::Association> associations, const LandmarkLog& part,
-                 BatchOptimum optimum) const {
-    PathDensity density(part, std::move(optimum));
-    const std::vector<SE2>& poses = density.optimum().poses;
-    const double log_evidence =
-        replayed(log_, associations, poses, empty_).walk.log_density - density.log_density(poses);
-    return {std::move(associations), std::move(density), log_evidence};
-  }
-  std::vector<Names> names_of(const Belief& belief, std::vector<SE2> start) {
+  /// log_share is then that among all names that are looked at.
+  std::vector<Names> names_of(const Belief& belief, std::vector<SE2> start, OtherNames& others) {
     const bool is_named = all_named(log_, frames_, options_.landmarks);
     const std::size_t asked = is_named ? 1 : 16;
     const std::vector<SE2> best = means_of(belief, belief.best());
@@ -211,10 +186,15 @@ private:
     std::vector<std::optional<Names>> all(seen.size());
     cairn::parallel_for(seen.size(), options_.threads, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i)
-        all[i].emplace(is_named ? named_so(std::move(seen[i]), *believed, std::move(*best_of_believed))
-                                : named_so(std::move(seen[i]), start));
+        all[i].emplace(
+            is_named ? weighed(log_, *believed, std::move(*best_of_believed), std::move(seen[i]), empty_)
+                     : weighed(log_, start, std::move(seen[i]), empty_));
     });
-    if (!has_identities(log_)) mend(all);
+    if (!has_identities(log_)) {
+      const auto log_share = [](const std::optional<Names>& names) { return names->log_share; };
+      if (auto better = others.much_likelier(**std::ranges::max_element(all, {}, log_share)))
+        all.push_back(std::move(better));
+    }
     std::vector<double> log_evidence;
     for (const auto& names : all) log_evidence.push_back(names->log_share);
     const double total = cairn::log_sum_exp(log_evidence);
@@ -224,57 +204,6 @@ private:
       result.push_back(std::move(*names));
     }
     return result;
-  }
-  /// The nearest pairs of landmarks that were never seen at once, each said to be one.
-  static std::vector<std::vector<cairn::Association>> mergings(const Names& names) {
-    constexpr double farthest = 2;  // [m]
-    constexpr std::size_t most = 4;
-    const auto& landmarks = names.density.optimum().landmarks;
-    std::vector<std::tuple<double, std::uint32_t, std::uint32_t>> pairs;
-    for (auto b = landmarks.begin(); b != landmarks.end(); ++b)
-      for (auto a = landmarks.begin(); a != b; ++a)
-        if (const double apart = (a->second - b->second).norm(); apart < farthest)
-          pairs.emplace_back(apart, a->first, b->first);
-    std::ranges::sort(pairs);
-    std::vector<std::vector<cairn::Association>> all;
-    for (const auto& [apart, a, b] : pairs)
-      if (all.size() < most)
-        if (auto one = merged(names.associations, a, b)) all.push_back(std::move(*one));
-    return all;
-  }
-  /// Adds better names than the best of all, while there are any: other readings of the sightings after gaps,
-  /// and landmarks that were begun twice made one. Much better ones: the errors of a camera's ranges belong
-  /// together, which the model does not know. Taken for every nat, UTIAS' robots made twenty landmarks of
-  /// fifteen; for ten, one in ten was led astray.
-  void mend(std::vector<std::optional<Names>>& all) const {
-    constexpr int most_rounds = 8;
-    constexpr double margin = 25;
-    const auto log_share = [](const std::optional<Names>& names) { return names->log_share; };
-    for (int round = 0; round < most_rounds; ++round) {
-      const Names& best = **std::ranges::max_element(all, {}, log_share);
-      const std::vector<SE2>& path = best.density.optimum().poses;
-      auto readings = rereadings(log_, path, empty_, options_.threads, 8);
-      for (auto& associations : mergings(best)) readings.push_back({path, std::move(associations)});
-      std::erase_if(readings, [&](const Reading& r) { return r.associations == best.associations; });
-      if (readings.empty()) return;
-      std::vector<std::optional<Names>> mended(readings.size());
-      cairn::parallel_for(readings.size(), options_.threads, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i)
-          mended[i].emplace(settled(named_so(std::move(readings[i].associations), readings[i].poses)));
-      });
-      auto& better = *std::ranges::max_element(mended, {}, log_share);
-      if (!(better->log_share > best.log_share + margin)) return;
-      all.push_back(std::move(better));
-    }
-  }
-  /// The same, or what is likeliest along their optimum where that is better.
-  Names settled(Names names) const {
-    const std::vector<SE2> path = names.density.optimum().poses;
-    auto along = associations_along(log_, log_, path, empty_);
-    if (along == names.associations) return names;
-    Names other = named_so(std::move(along), path);
-    if (other.log_share > names.log_share) return other;
-    return names;
   }
   /// For each path, by their shares.
   std::vector<std::size_t> drawn_names() {
@@ -286,7 +215,9 @@ private:
 
   Moving moving(std::size_t names, std::vector<double> white) const {
     const auto& [associations, density, log_share] = names_[names];
-    auto replay = std::make_shared<const Replayed>(replayed(log_, associations, density.path(white), empty_));
+    std::vector<SE2> poses = density.path(white);
+    Walk walk = walked(log_, poses, associations, empty_);
+    auto replay = std::make_shared<const Replayed>(Replayed{std::move(poses), std::move(walk)});
     const double log_ratio = replay->walk.log_density - density.log_density(replay->poses) - log_share;
     return {names, std::move(white), std::move(replay), log_ratio};
   }
@@ -612,6 +543,7 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
   Spread spread(belief);
   std::size_t doubted = 0;
   std::vector<SE2> odometry, optimum;
+  OtherNames others(log, options);
   const std::size_t every = std::max<std::size_t>(1, log.frames.size() / 40);
   for (const Frame& frame : log.frames) {
     const cairn::MappingStep did = step(filter, belief, frame, options.proposal);
@@ -620,7 +552,7 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
     std::optional<double> redrawn_size;
     const bool is_last = belief.steps() == log.frames.size();  // the path and map that are handed over
     if (redraws && (is_last || redraw_is_due(belief, log, spread.step(), options))) {
-      Redrawing redrawing(belief, log, options, optimum);
+      Redrawing redrawing(belief, log, options, optimum, others);
       belief = redrawing.redrawn();
       doubted = redrawing.doubted();
       redrawn_size = belief.particles().effective_size();

@@ -105,6 +105,37 @@ TEST_SUITE("fastslam/naming") {
           std::vector<Association>{{begun}, {begun, cairn::no_landmark}, {1}, {1, 0}, {1, begun}});
   }
 
+  TEST_CASE(
+      "fastslam: a landmark that was mistaken for its neighbour when young is named by what is known later") {
+    LandmarkLog log{.sensor = {.range_sigma = 0.3, .bearing_sigma = 0.03, .farthest = 20, .half_view = 3}};
+    const Vector<2> posts[] = {{3, 0}, {3.6, 0.5}};
+    cairn::Random random(11);
+    std::vector<SE2> path;
+    std::vector<Association> names;
+    for (std::uint32_t k = 0; k < 60; ++k) {
+      log.frames.push_back({static_cast<double>(k), {SE2(), 1e-4 * Matrix<3>::Identity()}, {}});
+      path.emplace_back();
+      const std::uint32_t is = k < 2 ? k : k % 2;
+      const Vector<2> off(random.normal(0, 0.1), random.normal(0, 0.05));
+      see(log, path.back(), posts[is] + off, is);
+      // Two of those in the first ten are of the other.
+      names.push_back({k < 2 ? begun : k == 4 || k == 7 ? 1 - is : is});
+    }
+    const auto again = reassigned(log, path, names, empty_map(log));
+    REQUIRE(again.size() == names.size());
+    for (std::uint32_t k = 0; k < 60; ++k) {
+      CAPTURE(k);
+      CHECK(again[k] == Association{k < 2 ? begun : k % 2});
+    }
+    // Numbers are those of a map that begins with them: without the first frame the second is number 0.
+    LandmarkLog rest = log;
+    rest.frames.erase(rest.frames.begin());
+    std::vector<Association> swapped;
+    for (std::uint32_t k = 1; k < 60; ++k) swapped.push_back({k < 3 ? begun : k == 4 ? 0 : 1 - k % 2});
+    path.pop_back();
+    CHECK(reassigned(rest, path, swapped, empty_map(log))[3] == Association{1});
+  }
+
   TEST_CASE("fastslam: a path that came back one post too far is read the other way as well") {
     LandmarkLog log{.sensor = {.range_sigma = 0.1, .bearing_sigma = 0.02, .farthest = 20, .half_view = 3}};
     const Vector<2> posts[] = {{0, 3}, {2, 3}, {4, 3}};
@@ -135,7 +166,7 @@ TEST_SUITE("fastslam/naming") {
 
   TEST_CASE("fastslam: a robot that is blind between its views finds out which posts it came back to") {
     double known = 0, withheld = 0;
-    for (const std::uint64_t seed : {3U, 4U}) {
+    for (const std::uint64_t seed : {5U, 9U}) {
       CAPTURE(seed);
       LandmarkLog log = blind_rounds(seed);
       known += *run(log, {.particles = 20, .seed = seed, .threads = 2}).path_error;
@@ -146,7 +177,8 @@ TEST_SUITE("fastslam/naming") {
       withheld += *r.path_error;
     }
     CAPTURE(known / 2);
-    CHECK(withheld < 1.5 * known);  // fourteen times, where names are only those of the particles' paths
+    // 2.5 and 1.05 m where names that are not the likeliest of the moment are forgotten.
+    CHECK(withheld < 1.5 * known);
   }
 }
 
