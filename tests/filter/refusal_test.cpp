@@ -10,6 +10,7 @@
 #include <tuple>
 #include <vector>
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <doctest/doctest.h>
 
