@@ -118,10 +118,11 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
       ->type_name("MS");
   app.add_flag("--oriented", arguments.pipeline.oriented,
                "oriented SURF, for cameras that roll (default: upright)");
-  app.add_option("--calibrate", arguments.calibrate,
-                 "the rig's calibration is corrected while moving: auto (where the first frame shows that it "
-                 "is off), on,\n"
-                 "off, or drifting (for rigs that come loose)")
+  app.add_option(
+         "--calibrate", arguments.calibrate,
+         "the rig's calibration is corrected while moving: auto (where the first frame shows that it "
+         "is off,\n"
+         "and where later ones show that it has come loose), on, off, or drifting (loose from the start)")
       ->check(one_of(stereo_slam::calibration_names))
       ->capture_default_str();
   app.add_option("--motion", arguments.motion,

@@ -46,6 +46,20 @@ cairn::KeyframeMapOptions map_options(const PipelineOptions& options) {
   return map;
 }
 
+std::string as_asked(const PipelineOptions& options) {
+  return std::string("asked for: ") + calibration_names[static_cast<std::size_t>(options.calibrate)];
+}
+
+std::string in_words(const VerticalDisparity& seen) {
+  const auto part = [](double value, double sigma) {
+    return cairn::shortest(std::round(1e3 * value) / 1e3) + " +- " +
+           cairn::shortest(std::round(1e3 * sigma) / 1e3);
+  };
+  return "vertical disparity " + part(seen.offset, seen.sigma_offset) + ", over half a width " +
+         part(seen.slope_x, seen.sigma_x) + ", over half a height " + part(seen.slope_y, seen.sigma_y) +
+         " pixels";
+}
+
 }  // namespace
 
 FeatureOptions feature_options(const PipelineOptions& options) {
@@ -100,6 +114,7 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options, 
   record_.calibration.on = map_.rig_correction().has_value();
   record_.calibration.why = "as the map has it";
   if (map_.rig_correction()) look_through(map_.rig());
+  if (options_.calibrate == Calibration::drifting) follow_rig(as_asked(options_));
 }
 
 const FrameRecord& Pipeline::step(const StereoFrame& frame, double load_milliseconds) {
@@ -154,9 +169,8 @@ std::shared_ptr<const StereoMatcher> Pipeline::settled_matcher() const {
 
 /// Whether the rig is or may yet come to be another than it is now.
 bool Pipeline::corrects_rig() const {
-  if (options_.calibrate == Calibration::drifting) return true;
   if (map_.empty()) return options_.calibrate != Calibration::off;
-  return map_.rig_correction().has_value();
+  return loose_ || map_.rig_correction();
 }
 
 void Pipeline::work_on(const StereoFrame& frame, const FramePoints& points, FrameRecord& result) {
@@ -213,27 +227,43 @@ void Pipeline::begin(const StereoFrame& frame, FrameRecord& result) {
 /// Whether the rig is to be part of the map's joint state.
 void Pipeline::choose_calibration() {
   CalibrationRecord& record = record_.calibration;
-  record.on = options_.calibrate == Calibration::on || options_.calibrate == Calibration::drifting;
-  record.why = std::string("asked for: ") + calibration_names[static_cast<std::size_t>(options_.calibrate)];
+  record.on = options_.calibrate == Calibration::on;
+  record.why = as_asked(options_);
+  if (options_.calibrate == Calibration::drifting) return follow_rig(record.why);
   if (options_.calibrate == Calibration::automatic) {
-    std::vector<cairn::PixelPair> pairs;
-    for (const LocalLandmark& local : locals_) pairs.push_back({local.left_pixel, local.right_pixel});
-    const VerticalDisparity seen = vertical_disparity(rig_, pairs);
+    const VerticalDisparity seen = disparity_of_locals();
     record.on = seen.shows();
-    const auto part = [](double value, double sigma) {
-      return cairn::shortest(std::round(1e3 * value) / 1e3) + " +- " +
-             cairn::shortest(std::round(1e3 * sigma) / 1e3);
-    };
-    record.why = "vertical disparity " + part(seen.offset, seen.sigma_offset) + ", over half a width " +
-                 part(seen.slope_x, seen.sigma_x) + ", over half a height " +
-                 part(seen.slope_y, seen.sigma_y) + " pixels";
+    record.why = in_words(seen);
   }
-  if (!record.on || options_.calibrate == Calibration::drifting) return;
+  if (!record.on) return;
   cairn::KeyframeMapOptions with_rig = map_options(options_);
   // The map takes pixels for independent and multiplies its covariances by how much they are not. What is
   // known beforehand of the rig is put on the same scale.
   with_rig.rig = options_.rig.scaled(1 / std::sqrt(NoiseFactors::by_keypoints));
   map_ = cairn::KeyframeMap(rig_, with_rig);
+}
+
+/// A rig that was as its file says and no longer is has come loose. One frame can be wrong.
+void Pipeline::watch_rig() {
+  constexpr int every = 5, beyond_chance = 3;
+  if (options_.calibrate != Calibration::automatic || corrects_rig() || step_ % every != 0) return;
+  const VerticalDisparity seen = disparity_of_locals();
+  shown_off_ = seen.shows() ? shown_off_ + 1 : 0;
+  if (shown_off_ < beyond_chance) return;
+  follow_rig("from frame " + std::to_string(step_) + " on: " + in_words(seen));
+  record_.notes.push_back("the rig has come loose; its right camera is followed " + record_.calibration.why);
+}
+
+void Pipeline::follow_rig(const std::string& why) {
+  record_.calibration.on = true;
+  record_.calibration.why = why;
+  loose_ = rig_;
+}
+
+VerticalDisparity Pipeline::disparity_of_locals() const {
+  std::vector<cairn::PixelPair> pairs;
+  for (const LocalLandmark& local : locals_) pairs.push_back({local.left_pixel, local.right_pixel});
+  return vertical_disparity(rig_, pairs);
 }
 
 /// Every other frame: where it is, and what the map learns by it.
@@ -268,7 +298,12 @@ void Pipeline::follow(const StereoFrame& frame, FrameRecord& result) {
     if (!options_.localise) if_time(Shed::tidying, [&] { age(*located); });
     close_step();
   });
-  if (options_.calibrate == Calibration::drifting) timed(result, Stage::update, [&] { calibrate(*located); });
+  timed(result, Stage::update, [&] {
+    if (loose_)
+      calibrate(*located);
+    else
+      watch_rig();
+  });
 }
 
 /// A frame that is nowhere: the camera is where its motion leads, as long as that is known.
@@ -304,9 +339,20 @@ void Pipeline::find_local_landmarks(std::span<const PointPair> pairs) {
   for (const PointPair& pair : pairs) {
     const double scale = left_->keypoints[pair.left].scale;
     const double sigma = options_.pixel_sigma * std::pow(scale, options_.scale_exponent);
-    if (!triangulate_(pair.left_pixel, pair.right_pixel, sigma, sigma).good()) continue;
-    locals_.push_back({pair.left, pair.left_pixel, pair.right_pixel, sigma, pair});
+    const cairn::Triangulation seen = triangulate_(pair.left_pixel, pair.right_pixel, sigma, sigma);
+    if (!seen.good()) continue;
+    if (const auto moved = put_back(seen.point))
+      locals_.push_back({pair.left, pair.left_pixel, pair.right_pixel + *moved, sigma, pair, *moved});
   }
+}
+
+/// How far from where the right camera sees a point it would see it, were the rig as the map knows it: what
+/// goes into the map is true of one rig, whatever that was when a place was seen.
+std::optional<cairn::Vector<2>> Pipeline::put_back(const cairn::Vector<3>& point) const {
+  if (!loose_) return cairn::Vector<2>::Zero();
+  const auto known = rig_.project(point), now = loose_->project(point);
+  if (!known || !now) return std::nullopt;
+  return known->tail<2>() - now->tail<2>();
 }
 
 /// The landmark of the map that looks like each local one, where one clearly does (ratio test: Lowe, IJCV
@@ -509,8 +555,7 @@ void Pipeline::add_landmarks(const std::vector<Match>& known, const StereoFrame&
   // A patch says where its landmark is to a twentieth of a pixel, and lenses that are wrong by more do not
   // let it: on a recorded drive that nothing was chosen on, patches doubled the error. Of a rig that comes
   // loose they make a smaller error whose NEES is nine times as large.
-  const bool with_patches =
-      options_.patches && !map_.rig_correction() && options_.calibrate != Calibration::drifting;
+  const bool with_patches = options_.patches && !corrects_rig();
   std::vector<std::uint8_t> taken(locals_.size(), 0);
   for (const Match& match : known) taken[match.local] = 1;
   for (std::uint32_t i = 0; i < locals_.size(); ++i) {
@@ -656,20 +701,23 @@ void Pipeline::merge_twins(const Located& located) {
 /// What the landmarks' motion in the images says of the rig.
 void Pipeline::calibrate(const Located& located) {
   std::vector<Sighting> seen;
-  seen.reserve(located.agreed_sightings.size());
-  for (const cairn::StereoSighting& one : located.agreed_sightings)
-    seen.push_back({one.landmark, one.left, one.right, one.sigma});
-  if (calibration_.observe(T_world_camera_, std::move(seen))) take_rig(calibration_.rig());
-}
-
-/// Another rig puts what was seen elsewhere; the map computes its landmarks anew from their sightings.
-void Pipeline::take_rig(const cairn::StereoRig& rig) {
-  look_through(rig);
-  map_.set_rig(rig);
+  seen.reserve(located.agreed.size());
+  for (std::size_t i = 0; i < located.agreed.size(); ++i) {
+    const cairn::StereoSighting& one = located.agreed_sightings[i];
+    const cairn::Vector<2> right = one.right - locals_[located.agreed[i].local].moved;
+    seen.push_back({one.landmark, one.left, right, one.sigma});
+  }
+  if (!calibration_.observe(T_world_camera_, std::move(seen))) return;
+  loose_ = calibration_.rig();
+  find_pairs_by(*loose_);
 }
 
 void Pipeline::look_through(const cairn::StereoRig& rig) {
   rig_ = rig;
+  find_pairs_by(rig);
+}
+
+void Pipeline::find_pairs_by(const cairn::StereoRig& rig) {
   triangulate_ = cairn::Triangulator(rig, triangulation_options(options_, rig));
   match_stereo_ = std::make_shared<const StereoMatcher>(rig, options_.stereo);
 }
@@ -769,14 +817,14 @@ std::vector<cairn::SE3> Pipeline::corrected_path() const {
 RunRecord Pipeline::record() {
   RunRecord record = record_;
   record.variance_factor = noise_factors_.poses();
-  record.rig = rig_;
+  record.rig = loose_.value_or(rig_);
   record.corrected = corrected_path();
   if (const auto rig = map_.rig_correction()) {
     record.calibration.numbers = rig->mean;
     const cairn::RigState before = options_.rig.each();
     for (int i = 0; i < cairn::rig_numbers; ++i)  // what is held to be known was not estimated
       record.calibration.sigmas(i) = before(i) > 0 ? std::sqrt(rig->covariance(i, i)) : 0;
-  } else if (options_.calibrate == Calibration::drifting) {
+  } else if (loose_) {
     record.calibration.numbers.head<5>() = calibration_.drift().state();
     record.calibration.sigmas.head<5>() = calibration_.drift().covariance().diagonal().cwiseSqrt();
   }
