@@ -4,6 +4,7 @@
 // Mapper::save and Mapper::loaded: all that a mapper is, so that going on from a file is going on.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -163,6 +164,13 @@ private:
   std::map<const void*, std::uint32_t> known_;  // looked up only; its order decides nothing
 };
 
+/// As the reader of logs has it: sums and products of such places are numbers.
+void expect_place(const Reader& reader, const cairn::SE2& pose) {
+  constexpr double farthest = 1e9;  // m
+  if (!(std::abs(pose.x()) <= farthest && std::abs(pose.y()) <= farthest))
+    reader.refuse("a pose lies more than 1e9 m away");
+}
+
 void expect_covariance(const Reader& reader, const cairn::Matrix<3>& covariance) {
   try {
     static_cast<void>(cairn::Gaussian<cairn::SE2>::checked(cairn::SE2(), covariance));
@@ -179,6 +187,9 @@ void expect_paths(const Reader& reader, const cairn::PathsRecord<cairn::SE2>& re
     if (!first && node.parent >= length.size()) reader.refuse("a pose comes before the one it follows");
     length.push_back(first ? 1 : length[node.parent] + 1);
     if (node.pose.step + 1 != length.back()) reader.refuse("a pose is not where it stands on its path");
+    for (const cairn::SE2& pose :
+         {node.pose.pose, node.pose.before, node.pose.drawn, node.pose.drawn_from.mean})
+      expect_place(reader, pose);
     expect_covariance(reader, node.pose.drawn_from.covariance);
   }
   for (const auto& particle : record.particles) {
@@ -217,7 +228,16 @@ void Mapper::expect_sound(const Reader& reader) const {
   for (const Loop& loop : loops_) {
     if (loop.first >= loop.last || loop.last >= travelled_.size())
       reader.refuse("a loop joins poses that there are not");
+    expect_place(reader, loop.T_first_last);
     expect_covariance(reader, loop.covariance);
+  }
+  for (const StepRecord& step : steps_) {
+    expect_place(reader, step.pose.mean);
+    expect_covariance(reader, step.pose.covariance);
+  }
+  for (const cairn::StampedScan& scan : scans_) {
+    expect_place(reader, scan.T_odom_laser);
+    expect_place(reader, scan.T_odom_robot);
   }
 }
 

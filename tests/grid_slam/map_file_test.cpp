@@ -140,6 +140,37 @@ TEST_SUITE("grid_slam/map_file") {
     CHECK(refused > 0);
   }
 
+  TEST_CASE("map_file: poses too far away to be added up are refused in words") {
+    const cairn_test::Folder folder;
+    auto scan = simulated_drive({.seed = 2}).log.scans.front();
+    const double x = 1234.5678;
+    scan.T_odom_laser = SE2(x, 0, 0);
+    Mapper mapper({.particles = 1});
+    mapper.add(scan);
+    mapper.save(folder / "map");
+    const std::string numbers = cairn::read_file(folder / "map").substr(32);
+    const auto bytes = [](double number) {
+      std::string text(8, 0);
+      std::memcpy(text.data(), &number, 8);
+      return text;
+    };
+    std::size_t places = 0;
+    for (std::size_t at = 0; (at = numbers.find(bytes(x), at)) != std::string::npos; ++at) {
+      ++places;
+      for (const double far : {1e300, -2e9}) {
+        std::string moved = numbers;
+        moved.replace(at, 8, bytes(far));
+        cairn::BinaryWriter changed;
+        for (const char c : moved) changed.put(c);
+        folder.put("changed", changed.file("cairngrd", 4));
+        const std::string words =
+            cairn_test::message_of([&] { static_cast<void>(Mapper::loaded(folder / "changed")); });
+        CHECK(words.find("more than 1e9 m away") != std::string::npos);
+      }
+    }
+    CHECK(places >= 1);  // of the scan's odometry, and of what began there
+  }
+
   TEST_CASE("map_file: shares of the delays that do not sum to one are refused in words") {
     const cairn_test::Folder folder;
     Mapper mapper({.particles = 1});

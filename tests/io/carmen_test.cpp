@@ -102,6 +102,8 @@ TEST_SUITE("io/carmen") {
       CHECK(words_of(line).find("the largest range: a number above zero ('" + std::string(farthest) + "'") !=
             std::string::npos);
     }
+    CHECK(words_of("FLASER 1 1 0 1e300 0 0 0 0 1 h 0\n")
+              .find("the laser's pose: metres within 1e9 ('1e300' is none)") != std::string::npos);
     CHECK(words_of("FLASER\n").find("number of ranges") != std::string::npos);
     const cairn_test::Folder folder;
     CHECK_FALSE(cairn_test::message_of([&] { static_cast<void>(read_carmen(folder / "none")); }).empty());

@@ -67,10 +67,9 @@ public:
   explicit CarmenFields(const TextLines& lines) : lines_(lines), rest_(lines.line()) { take(); }
 
   std::string_view take() {
+    const std::string_view field = next();
     rest_ = trimmed(rest_);
-    const std::size_t end = std::min(rest_.find_first_of(" \t"), rest_.size());
-    const std::string_view field = rest_.substr(0, end);
-    rest_.remove_prefix(end);
+    rest_.remove_prefix(field.size());
     return field;
   }
 
@@ -82,9 +81,9 @@ public:
   }
 
   double above_zero(const char* what) {
-    const std::string_view field = trimmed(rest_);
+    const std::string_view field = next();
     const double value = number(what);
-    if (!(value > 0)) refuse(what, "a number above zero", field.substr(0, field.find_first_of(" \t")));
+    if (!(value > 0)) refuse(what, "a number above zero", field);
     return value;
   }
 
@@ -97,8 +96,16 @@ public:
     return *value;
   }
 
+  /// Places farther off than a million kilometres are refused: what is composed of poses should be numbers.
   SE2 pose(const char* what) {
-    const double x = number(what), y = number(what), theta = number(what);
+    const auto length = [&] {
+      constexpr double farthest = 1e9;
+      const std::string_view field = next();
+      const double value = number(what);
+      if (!(std::abs(value) <= farthest)) refuse(what, "metres within 1e9", field);
+      return value;
+    };
+    const double x = length(), y = length(), theta = number(what);
     return {x, y, theta};
   }
 
@@ -111,6 +118,11 @@ public:
   }
 
 private:
+  [[nodiscard]] std::string_view next() const {
+    const std::string_view rest = trimmed(rest_);
+    return rest.substr(0, rest.find_first_of(" \t"));
+  }
+
   [[noreturn]] void refuse(const char* what, const char* expected, std::string_view found) const {
     std::string text(what);
     text.append(": ").append(expected);
