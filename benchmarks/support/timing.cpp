@@ -62,6 +62,7 @@ std::vector<Timing> interleave(const std::vector<Contender>& contenders, const I
     for (std::size_t turn = 0; turn < contenders.size(); ++turn) {
       const std::size_t i = (turn + static_cast<std::size_t>(round)) % contenders.size();
       const double operations = contenders[i].operations * repeats[i];
+      if (options.run_first) contenders[i].run();
       timings[i].rounds.push_back(seconds_of_repeats(contenders[i], repeats[i]) / operations);
     }
   for (Timing& timing : timings) {

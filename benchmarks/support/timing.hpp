@@ -44,6 +44,9 @@ struct Timing {
 struct InterleaveOptions {
   int rounds = 15;
   double seconds_per_round = 0.02;  ///< each contender repeats its run until a turn takes about this long
+  /// One untimed run before each turn, for sets larger than the caches: what the one before left of caches
+  /// and of the machine's tables of pages is not the cost of the next.
+  bool run_first = false;
 };
 
 /// Times all contenders in turns, in an order that rotates from round to round, after one untimed turn each.

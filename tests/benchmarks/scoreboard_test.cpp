@@ -114,4 +114,15 @@ TEST_SUITE("scoreboard") {
     }
     CHECK(about_four);
   }
+
+  TEST_CASE("timing: before a turn a contender is run untimed where that is asked for") {
+    const auto runs = [](bool run_first) {
+      int count = 0;
+      cairn_bench::interleave({{"counted", [&] { ++count; }}},
+                              {.rounds = 3, .seconds_per_round = 0, .run_first = run_first});
+      return count;
+    };
+    CHECK(runs(false) == 1 + 3);
+    CHECK(runs(true) == 1 + 3 * 2);
+  }
 }
