@@ -239,9 +239,9 @@ public:
   [[nodiscard]] double pixel_factor() const noexcept { return pixel_factor_; }
   [[nodiscard]] double pose_factor() const noexcept { return pose_factor_; }
 
-  /// Another calibration, from outside: landmarks will be where their lists say under it, all that was seen so
-  /// far included. Of a rig that came loose on the way the pixels are to be put back instead, or what was seen
-  /// before is wrong. Not where the map estimates the rig itself. O(landmarks).
+  /// Another calibration, from outside: landmarks will be where their lists say under it, all that was seen
+  /// so far included. Of a rig that came loose on the way the pixels are to be put back instead, or what was
+  /// seen before is wrong. Not where the map estimates the rig itself. O(landmarks).
   void set_rig(const StereoRig& rig) {
     CAIRN_EXPECTS(!with_rig(), "KeyframeMap::set_rig: this map estimates its rig");
     CAIRN_EXPECTS(rig.baseline() > 0, "KeyframeMap: the rig needs a baseline");
