@@ -773,8 +773,8 @@ SampleFrame Pipeline::sample_of(const StereoFrame& frame, const std::vector<Matc
                                 const std::vector<Match>& agreed) const {
   SampleFrame sample{frame.index, frame.left, frame.right, {}};
   for (const LocalLandmark& local : locals_) {
-    const cairn::Vector<4, float> p =
-        (cairn::Vector<4>() << local.left_pixel, local.right_pixel).finished().cast<float>();
+    const cairn::Vector<2> seen = local.right_pixel - local.moved;  // where the image shows it
+    const cairn::Vector<4, float> p = (cairn::Vector<4>() << local.left_pixel, seen).finished().cast<float>();
     sample.points.push_back({p(0), p(1), p(2), p(3), SamplePoint::Kind::fresh});
   }
   for (const Match& match : matches) sample.points[match.local].kind = SamplePoint::Kind::matched;
