@@ -17,6 +17,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/grid/shared_tiles.hpp>
+#include <cairn/io/carmen.hpp>
 #include <cairn/io/file.hpp>
 #include <cairn/io/text.hpp>
 
@@ -166,8 +167,7 @@ private:
 
 /// As the reader of logs has it: sums and products of such places are numbers.
 void expect_place(const Reader& reader, const cairn::SE2& pose) {
-  constexpr double farthest = 1e9;  // m
-  if (!(std::abs(pose.x()) <= farthest && std::abs(pose.y()) <= farthest))
+  if (!(std::abs(pose.x()) <= cairn::farthest_odometry && std::abs(pose.y()) <= cairn::farthest_odometry))
     reader.refuse("a pose lies more than 1e9 m away");
 }
 

@@ -1,9 +1,11 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -52,6 +54,16 @@ Drive another_drive() {
     scan.T_odom_robot = elsewhere * scan.T_odom_robot;
   }
   return drive;
+}
+
+/// The numbers of a saved map, and a map's file of such numbers: its checksum fits whatever they are.
+std::string numbers_of(const std::filesystem::path& map) {
+  return cairn::read_file(map).substr(32);
+}
+std::string map_of(const std::string& numbers) {
+  cairn::BinaryWriter out;
+  for (const char c : numbers) out.put(c);
+  return out.file("cairngrd", 4);
 }
 
 }  // namespace
@@ -115,19 +127,19 @@ TEST_SUITE("grid_slam/map_file") {
     Mapper mapper({.particles = 2});
     for (std::size_t i = 0; i < 60; ++i) mapper.add(drive.log.scans[i]);
     mapper.save(folder / "map");
-    const std::string numbers = cairn::read_file(folder / "map").substr(32);
+    const std::string numbers = numbers_of(folder / "map");
     const std::uint64_t seed = cairn_test::seed();
     CAPTURE(seed);
     cairn::Random random(seed);
     const double values[] = {NAN, INFINITY, 1e300, -1e300, -1, 1e-300, 0.5};
     int refused = 0;
     for (int round = 0; round < 150; ++round) {
-      cairn::BinaryWriter changed;
       const std::size_t at = random.below(numbers.size() - 8) / 8 * 8 + (round % 2 == 0 ? 0 : 4);
       char bytes[8];
       std::memcpy(bytes, &values[round % 7], 8);
-      for (std::size_t i = 0; i < numbers.size(); ++i) changed.put(i - at < 8 ? bytes[i - at] : numbers[i]);
-      folder.put("changed", changed.file("cairngrd", 4));
+      std::string changed = numbers;
+      changed.replace(at, 8, bytes, std::min<std::size_t>(8, numbers.size() - at));
+      folder.put("changed", map_of(changed));
       const std::string words = cairn_test::message_of([&] {
         Mapper loaded = Mapper::loaded(folder / "changed");
         loaded.save(folder / "again");
@@ -148,7 +160,7 @@ TEST_SUITE("grid_slam/map_file") {
     Mapper mapper({.particles = 1});
     mapper.add(scan);
     mapper.save(folder / "map");
-    const std::string numbers = cairn::read_file(folder / "map").substr(32);
+    const std::string numbers = numbers_of(folder / "map");
     const auto bytes = [](double number) {
       std::string text(8, 0);
       std::memcpy(text.data(), &number, 8);
@@ -160,9 +172,7 @@ TEST_SUITE("grid_slam/map_file") {
       for (const double far : {1e300, -2e9}) {
         std::string moved = numbers;
         moved.replace(at, 8, bytes(far));
-        cairn::BinaryWriter changed;
-        for (const char c : moved) changed.put(c);
-        folder.put("changed", changed.file("cairngrd", 4));
+        folder.put("changed", map_of(moved));
         const std::string words =
             cairn_test::message_of([&] { static_cast<void>(Mapper::loaded(folder / "changed")); });
         CHECK(words.find("more than 1e9 m away") != std::string::npos);
@@ -176,7 +186,7 @@ TEST_SUITE("grid_slam/map_file") {
     Mapper mapper({.particles = 1});
     mapper.add(simulated_drive({.seed = 2}).log.scans.front());
     mapper.save(folder / "map");
-    std::string numbers = cairn::read_file(folder / "map").substr(32);
+    std::string numbers = numbers_of(folder / "map");
     // They stand before the two numbers on looks for loops that end the file.
     const std::size_t at = numbers.size() - 1 - 8 - 8 * ScanDelay::count;
     double share = 0, sum = 0;
@@ -186,9 +196,7 @@ TEST_SUITE("grid_slam/map_file") {
     }
     REQUIRE(sum == doctest::Approx(1));
     const auto words = [&] {
-      cairn::BinaryWriter out;
-      for (const char c : numbers) out.put(c);
-      folder.put("map", out.file("cairngrd", 4));
+      folder.put("map", map_of(numbers));
       return cairn_test::message_of([&] { static_cast<void>(Mapper::loaded(folder / "map")); });
     };
     CHECK(words().empty());

@@ -53,6 +53,10 @@ struct StampedOdometry {
   SE2 T_odom_robot;
 };
 
+/// Poses of a log lie within so many metres of odometry's origin along either axis: what is composed of them
+/// should be numbers.
+inline constexpr double farthest_odometry = 1e9;
+
 /// What a log holds of scans and odometry, each in the order of the file.
 struct CarmenLog {
   std::vector<StampedScan> scans;
@@ -64,12 +68,11 @@ namespace detail {
 /// Takes the fields of one line one after the other.
 class CarmenFields {
 public:
-  explicit CarmenFields(const TextLines& lines) : lines_(lines), rest_(lines.line()) { take(); }
+  explicit CarmenFields(const TextLines& lines) : lines_(lines), rest_(trimmed(lines.line())) { take(); }
 
   std::string_view take() {
     const std::string_view field = next();
-    rest_ = trimmed(rest_);
-    rest_.remove_prefix(field.size());
+    rest_ = trimmed(rest_.substr(field.size()));
     return field;
   }
 
@@ -96,13 +99,11 @@ public:
     return *value;
   }
 
-  /// Places farther off than a million kilometres are refused: what is composed of poses should be numbers.
   SE2 pose(const char* what) {
     const auto length = [&] {
-      constexpr double farthest = 1e9;
       const std::string_view field = next();
       const double value = number(what);
-      if (!(std::abs(value) <= farthest)) refuse(what, "metres within 1e9", field);
+      if (!(std::abs(value) <= farthest_odometry)) refuse(what, "metres within 1e9", field);
       return value;
     };
     const double x = length(), y = length(), theta = number(what);
@@ -118,10 +119,7 @@ public:
   }
 
 private:
-  [[nodiscard]] std::string_view next() const {
-    const std::string_view rest = trimmed(rest_);
-    return rest.substr(0, rest.find_first_of(" \t"));
-  }
+  [[nodiscard]] std::string_view next() const { return rest_.substr(0, rest_.find_first_of(" \t")); }
 
   [[noreturn]] void refuse(const char* what, const char* expected, std::string_view found) const {
     std::string text(what);
@@ -134,7 +132,7 @@ private:
   }
 
   const TextLines& lines_;
-  std::string_view rest_;
+  std::string_view rest_;  ///< of the line, no blanks around it
 };
 
 /// FLASER says nothing of its angles. Half a turn from -90 deg on: an odd number of beams has both ends, an
