@@ -256,6 +256,25 @@ TEST_SUITE("steady_state") {
     }
   }
 
+  TEST_CASE("steady_state: what rounding decides is refused, and nothing beside it") {
+    const Matrix<3> f = Vector<3>(0.99994, 0.99944, 1 - 1.5e-8).asDiagonal();
+    const Vector<3> g(3.634, 7.948, -11079.4);
+    Matrix<2, 3> h = Matrix<2, 3>::Zero();
+    h.col(0).setConstant(0.0746);
+    Matrix<2> r;
+    r << 1.4e-9, 0.8e-9, 0.8e-9, 0.6e-9;
+    const auto settled = [&](double noise) {
+      return cairn::steady_state<3, 2, double>(f, h, g * g.transpose(), Matrix<2>(noise * r));
+    };
+    // Exactly, in 113 bits, updated(2, 2) is 0.741008; of the doubles' P of 1.2e8 came 0.916.
+    CHECK(settled(1).status == Status::not_converged);
+    const auto noisy = settled(1e4);
+    REQUIRE(noisy.accepted());
+    check_digits(noisy.updated(0, 0), 0.000898385649113, 1e-9);
+    check_digits(noisy.updated(1, 1), 0.00429838795934, 1e-9);
+    check_digits(noisy.updated(2, 2), 9352.21211484, 1e-3);
+  }
+
   TEST_CASE("steady_state: says so where there is none") {
     const Matrix<1> one(1.0);
     CHECK(cairn::steady_state<1, 1, double>(2 * one, 0 * one, one, one).status == Status::not_converged);

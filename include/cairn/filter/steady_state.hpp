@@ -116,6 +116,23 @@ template <int N, int M, class S>
   return Status::accepted;
 }
 
+/// Whether result.updated means something. P is at best what a last digit more or less of noise at every step
+/// makes of it, and a measurement far better than P leaves the difference of two numbers nearly equal: where
+/// what remains of those digits after a measurement exceeds a thousandth of `updated`, it is made of them.
+template <int N, int M, class S>
+[[nodiscard]] bool outlives_rounding(const Matrix<N, N, S>& loop, const Matrix<M, N, S>& h,
+                                     const Vector<N, S>& deviation, const SteadyState<N, M, S>& result) {
+  const int n = static_cast<int>(h.cols());
+  Matrix<N, N, S> lost = Matrix<N, N, S>::Zero(n, n);
+  for (int i = 0; i < n; ++i) lost(i, i) = std::numeric_limits<S>::epsilon() * result.predicted(i, i);
+  if (!sum_of_congruences<N, S>(loop, deviation, lost)) return false;
+  const Matrix<N, N, S> left = Matrix<N, N, S>::Identity(n, n) - column_product(result.gain, h);
+  lost = column_product(left, column_product(lost, transposed<N, N, S>(left)));
+  for (int i = 0; i < n; ++i)
+    if (lost(i, i) > S(1e-3) * result.updated(i, i)) return false;
+  return true;
+}
+
 /// Newton's method from a P that is nearly right, which result.predicted is.
 template <int N, int M, class S>
 [[nodiscard]] Status settle(const Matrix<N, N, S>& f, const Matrix<M, N, S>& h, const Matrix<N, N, S>& q,
@@ -138,7 +155,10 @@ template <int N, int M, class S>
     for (int i = 0; i < n; ++i)
       for (int j = 0; j <= i; ++j) small = small && abs(x(i, j)) <= tolerance * deviation(i) * deviation(j);
     result.predicted += x;
-    if (round > 0 && small) return settled_update(h, r, result);
+    if (!(round > 0 && small)) continue;
+    const Status last = settled_update(h, r, result);
+    if (last != Status::accepted) return last;
+    return outlives_rounding<N, M, S>(a, h, deviation, result) ? Status::accepted : Status::not_converged;
   }
   return Status::not_converged;
 }
@@ -146,8 +166,9 @@ template <int N, int M, class S>
 }  // namespace detail
 
 /// Steady state of x' = F x + noise(Q), z = H x + noise(R). Refused: not_converged, where no filter settles
-/// (a state that does not decay and is not seen, or is not driven) or P is not known to a third of the
-/// digits, in deviations; not_positive_definite, where R is not, or Q is no covariance.
+/// (a state that does not decay and is not seen, or is not driven), P is not known to a third of the digits,
+/// in deviations, or rounding moves `updated` by more than 1e-3; not_positive_definite, where R is not, or Q
+/// is no covariance.
 template <int N, int M, class S>
 [[nodiscard]] SteadyState<N, M, S> steady_state(const Matrix<N, N, S>& f, const Matrix<M, N, S>& h,
                                                 const Matrix<N, N, S>& q, const Matrix<M, M, S>& r) {
