@@ -12,6 +12,7 @@
 #include <cairn/filter/gaussian.hpp>
 
 #include "ekf_slam.hpp"
+#include "scores.hpp"
 #include "slam.hpp"
 
 namespace {

@@ -30,6 +30,7 @@
 #include "joint_rival.hpp"
 #include "linear.hpp"
 #include "lines.hpp"
+#include "scores.hpp"
 #include "shared_buckets.hpp"
 #include "slam.hpp"
 #include "support/data.hpp"

@@ -12,6 +12,7 @@
 #include <cairn/io/file.hpp>
 #include <cairn/io/text.hpp>
 
+#include "scores.hpp"
 #include "support/report.hpp"
 #include "support/result_folder.hpp"
 

@@ -20,6 +20,7 @@
 #include "batch.hpp"
 #include "names.hpp"
 #include "naming.hpp"
+#include "scores.hpp"
 
 namespace fastslam {
 
@@ -412,98 +413,7 @@ Snapshot snapshot_of(const Belief& belief, double time) {
   return s;
 }
 
-/// The pose at a time, or nothing before the first; the truth is sampled far more often than it moves.
-const StampedPose2* last_until(const std::vector<StampedPose2>& path, double time) {
-  const auto after = std::upper_bound(path.begin(), path.end(), time,
-                                      [](double t, const StampedPose2& p) { return t < p.time; });
-  return after == path.begin() ? nullptr : &*std::prev(after);
-}
-
-void measure_path(Results& r, const LandmarkLog& log) {
-  if (log.truth.empty()) return;
-  std::vector<Vector<2>> is, path, odometry;
-  for (std::size_t k = 0; k < r.mean.size(); ++k)
-    if (const StampedPose2* truth = last_until(log.truth, r.mean[k].time)) {
-      is.push_back(truth->pose.translation());
-      path.push_back(r.mean[k].pose.translation());
-      odometry.push_back(r.odometry[k].pose.translation());
-      r.truth.push_back({r.mean[k].time, truth->pose});
-    }
-  if (is.empty()) return;
-  r.path_error = rms(path, is, rigid_fit(path, is));
-  r.odometry_error = rms(odometry, is, rigid_fit(odometry, is));
-}
-
-void measure_landmarks(Results& r, const LandmarkLog& log) {
-  if (!r.identities_known) return;
-  std::vector<Vector<2>> found, is;
-  for (const FoundLandmark& l : r.landmarks)
-    if (const auto truth = log.landmarks.find(l.number); truth != log.landmarks.end()) {
-      found.push_back(l.belief.mean);
-      is.push_back(truth->second);
-    }
-  if (found.size() >= 2) r.landmark_error = rms(found, is, rigid_fit(found, is));
-}
-
-/// GPS beside the path. The receiver of such a car jumps by tens of metres: the motion is fitted to the fixes
-/// that are nearest to the path, four fifths of them, ten times over.
-void measure_gps(Results& r, const LandmarkLog& log) {
-  std::vector<Vector<2>> fixes, path;
-  for (const GpsFix& fix : log.gps)
-    if (const StampedPose2* pose = last_until(r.mean, fix.time)) {
-      fixes.push_back(fix.place);
-      path.push_back(pose->pose.translation());
-    }
-  if (fixes.size() < 4) return;
-  std::vector<std::size_t> order(fixes.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  SE2 fit = rigid_fit(fixes, path);
-  std::vector<double> distance(fixes.size());
-  for (int round = 0; round <= 10; ++round) {
-    for (std::size_t i = 0; i < fixes.size(); ++i) distance[i] = (fit * fixes[i] - path[i]).norm();
-    std::ranges::sort(order, {}, [&](std::size_t i) { return std::pair(distance[i], i); });
-    if (round == 10) break;
-    std::vector<Vector<2>> from, to;
-    for (std::size_t k = 0; k < order.size() * 4 / 5; ++k) {
-      from.push_back(fixes[order[k]]);
-      to.push_back(path[order[k]]);
-    }
-    fit = rigid_fit(from, to);
-  }
-  r.gps_median = distance[order[order.size() / 2]];
-  for (const Vector<2>& fix : fixes) r.gps.emplace_back(fit * fix);
-}
-
 }  // namespace
-
-SE2 rigid_fit(const std::vector<Vector<2>>& from, const std::vector<Vector<2>>& to) {
-  Vector<2> a = Vector<2>::Zero(), b = Vector<2>::Zero();
-  const auto count = static_cast<double>(from.size());
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    a += from[i] / count;
-    b += to[i] / count;
-  }
-  double sine = 0, cosine = 0;
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    const Vector<2> p = from[i] - a, q = to[i] - b;
-    cosine += p(0) * q(0) + p(1) * q(1);
-    sine += p(0) * q(1) - p(1) * q(0);
-  }
-  const cairn::SO2 turn(std::atan2(sine, cosine));
-  return {turn, Vector<2>(b - turn * a)};
-}
-
-double rms(const std::vector<Vector<2>>& from, const std::vector<Vector<2>>& to, const SE2& by) {
-  double sum = 0;
-  for (std::size_t i = 0; i < from.size(); ++i) sum += (by * from[i] - to[i]).squaredNorm();
-  return std::sqrt(sum / static_cast<double>(from.size()));
-}
-
-std::vector<Vector<2>> places_of(const std::vector<StampedPose2>& path) {
-  std::vector<Vector<2>> places;
-  for (const StampedPose2& p : path) places.push_back(p.pose.translation());
-  return places;
-}
 
 std::vector<StampedPose2> filled(const LandmarkLog& log, const std::vector<SE2>& poses) {
   std::vector<StampedPose2> all;
@@ -583,9 +493,7 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
   r.mean = filled(log, mean_path(belief));
   r.landmarks = landmarks_of(belief[belief.best()].map);
   r.node_copies = belief[belief.best()].map.node_copies();
-  measure_path(r, log);
-  measure_landmarks(r, log);
-  measure_gps(r, log);
+  measure(r, log);
   return r;
 }
 

@@ -110,12 +110,4 @@ struct Results {
 [[nodiscard]] std::vector<cairn::StampedPose2> filled(const LandmarkLog& log,
                                                       const std::vector<cairn::SE2>& poses);
 
-/// The motion that brings points nearest to others, in the sense of least squares.
-[[nodiscard]] cairn::SE2 rigid_fit(const std::vector<cairn::Vector<2>>& from,
-                                   const std::vector<cairn::Vector<2>>& to);
-/// Root mean square distance of the moved points from the others.
-[[nodiscard]] double rms(const std::vector<cairn::Vector<2>>& from, const std::vector<cairn::Vector<2>>& to,
-                         const cairn::SE2& by);
-[[nodiscard]] std::vector<cairn::Vector<2>> places_of(const std::vector<cairn::StampedPose2>& path);
-
 }  // namespace fastslam

@@ -1,0 +1,190 @@
+// SPDX-FileCopyrightText: 2026 The cairn authors
+// SPDX-License-Identifier: MIT
+#include "scores.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <iterator>
+#include <limits>
+#include <numeric>
+#include <optional>
+#include <utility>
+
+namespace fastslam {
+
+namespace {
+
+using cairn::SE2;
+using cairn::StampedPose2;
+using cairn::Vector;
+
+void measure_path(Results& r, const LandmarkLog& log) {
+  if (log.truth.empty()) return;
+  std::vector<Vector<2>> is, path, odometry;
+  for (std::size_t k = 0; k < r.mean.size(); ++k)
+    if (const StampedPose2* truth = last_until(log.truth, r.mean[k].time)) {
+      is.push_back(truth->pose.translation());
+      path.push_back(r.mean[k].pose.translation());
+      odometry.push_back(r.odometry[k].pose.translation());
+      r.truth.push_back({r.mean[k].time, truth->pose});
+    }
+  if (is.empty()) return;
+  r.path_error = rms(path, is, rigid_fit(path, is));
+  r.odometry_error = rms(odometry, is, rigid_fit(odometry, is));
+}
+
+/// Half of what a true landmark is away from the nearest other, in the median: a found one that is nearer to
+/// a true one than this is hardly of its neighbour.
+double half_spacing(const std::vector<Vector<2>>& truth) {
+  std::vector<double> spacing(truth.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t i = 0; i < truth.size(); ++i)
+    for (std::size_t j = 0; j < truth.size(); ++j)
+      if (i != j) spacing[i] = std::min(spacing[i], (truth[i] - truth[j]).norm());
+  std::ranges::nth_element(spacing, spacing.begin() + std::ssize(spacing) / 2);
+  return 0.5 * spacing[spacing.size() / 2];
+}
+
+const Vector<2>& nearest_to(const Vector<2>& place, const std::vector<Vector<2>>& truth) {
+  return *std::ranges::min_element(truth, {}, [&](const Vector<2>& t) { return (t - place).squaredNorm(); });
+}
+
+/// Sum over the places, moved, of the squared distance to the nearest true one, each at most limit^2; more
+/// than `enough` where it is at least that.
+double misfit(const std::vector<Vector<2>>& found, const std::vector<Vector<2>>& truth, const SE2& by,
+              double limit, double enough) {
+  double sum = 0;
+  for (std::size_t i = 0; i < found.size() && sum < enough; ++i) {
+    const Vector<2> place = by * found[i];
+    sum += std::min((nearest_to(place, truth) - place).squaredNorm(), limit * limit);
+  }
+  return sum;
+}
+
+/// The places that the pairs of the first four make likely are tried, and the motion refined by who is
+/// nearest.
+std::optional<SE2> fit_to_nearest(const std::vector<Vector<2>>& found, const std::vector<Vector<2>>& truth) {
+  const double limit = half_spacing(truth);
+  double least = std::numeric_limits<double>::infinity();
+  std::optional<SE2> best;
+  const std::size_t first = std::min<std::size_t>(4, found.size());
+  for (std::size_t a = 0; a < first; ++a)
+    for (std::size_t b = a + 1; b < first; ++b)
+      for (const Vector<2>& p : truth)
+        for (const Vector<2>& q : truth) {
+          const double apart = (q - p).norm();
+          if (apart == 0 || std::abs(apart - (found[b] - found[a]).norm()) > limit) continue;
+          const SE2 by = rigid_fit({found[a], found[b]}, {p, q});
+          const double sum = misfit(found, truth, by, limit, least);
+          if (sum < least) least = sum, best = by;
+        }
+  for (int round = 0; best && round < 20; ++round) {
+    std::vector<Vector<2>> near, is;
+    for (const Vector<2>& place : found)
+      if (const Vector<2>& nearest = nearest_to(*best * place, truth);
+          (*best * place - nearest).norm() < limit) {
+        near.push_back(place);
+        is.push_back(nearest);
+      }
+    if (near.size() < 2) break;
+    best = rigid_fit(near, is);
+  }
+  return best;
+}
+
+void measure_unnamed_landmarks(Results& r) {
+  if (r.landmarks.size() < 2 || r.true_landmarks.size() < 2) return;
+  std::vector<FoundLandmark> by_sightings = r.landmarks;
+  std::ranges::stable_sort(by_sightings, std::ranges::greater{}, &FoundLandmark::sightings);
+  std::vector<Vector<2>> found, is;
+  for (const FoundLandmark& l : by_sightings) found.push_back(l.belief.mean);
+  const std::optional<SE2> fit = fit_to_nearest(found, r.true_landmarks);
+  if (!fit) return;
+  for (const Vector<2>& place : found) is.push_back(nearest_to(*fit * place, r.true_landmarks));
+  r.landmark_error = rms(found, is, *fit);
+}
+
+void measure_landmarks(Results& r, const LandmarkLog& log) {
+  if (!r.identities_known) return measure_unnamed_landmarks(r);
+  std::vector<Vector<2>> found, is;
+  for (const FoundLandmark& l : r.landmarks)
+    if (const auto truth = log.landmarks.find(l.number); truth != log.landmarks.end()) {
+      found.push_back(l.belief.mean);
+      is.push_back(truth->second);
+    }
+  if (found.size() >= 2) r.landmark_error = rms(found, is, rigid_fit(found, is));
+}
+
+/// GPS beside the path. The receiver of such a car jumps by tens of metres: the motion is fitted to the fixes
+/// that are nearest to the path, four fifths of them, ten times over.
+void measure_gps(Results& r, const LandmarkLog& log) {
+  std::vector<Vector<2>> fixes, path;
+  for (const GpsFix& fix : log.gps)
+    if (const StampedPose2* pose = last_until(r.mean, fix.time)) {
+      fixes.push_back(fix.place);
+      path.push_back(pose->pose.translation());
+    }
+  if (fixes.size() < 4) return;
+  std::vector<std::size_t> order(fixes.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  SE2 fit = rigid_fit(fixes, path);
+  std::vector<double> distance(fixes.size());
+  for (int round = 0; round <= 10; ++round) {
+    for (std::size_t i = 0; i < fixes.size(); ++i) distance[i] = (fit * fixes[i] - path[i]).norm();
+    std::ranges::sort(order, {}, [&](std::size_t i) { return std::pair(distance[i], i); });
+    if (round == 10) break;
+    std::vector<Vector<2>> from, to;
+    for (std::size_t k = 0; k < order.size() * 4 / 5; ++k) {
+      from.push_back(fixes[order[k]]);
+      to.push_back(path[order[k]]);
+    }
+    fit = rigid_fit(from, to);
+  }
+  r.gps_median = distance[order[order.size() / 2]];
+  for (const Vector<2>& fix : fixes) r.gps.emplace_back(fit * fix);
+}
+
+}  // namespace
+
+const StampedPose2* last_until(const std::vector<StampedPose2>& path, double time) {
+  const auto after = std::upper_bound(path.begin(), path.end(), time,
+                                      [](double t, const StampedPose2& p) { return t < p.time; });
+  return after == path.begin() ? nullptr : &*std::prev(after);
+}
+
+SE2 rigid_fit(const std::vector<Vector<2>>& from, const std::vector<Vector<2>>& to) {
+  Vector<2> a = Vector<2>::Zero(), b = Vector<2>::Zero();
+  const auto count = static_cast<double>(from.size());
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    a += from[i] / count;
+    b += to[i] / count;
+  }
+  double sine = 0, cosine = 0;
+  for (std::size_t i = 0; i < from.size(); ++i) {
+    const Vector<2> p = from[i] - a, q = to[i] - b;
+    cosine += p(0) * q(0) + p(1) * q(1);
+    sine += p(0) * q(1) - p(1) * q(0);
+  }
+  const cairn::SO2 turn(std::atan2(sine, cosine));
+  return {turn, Vector<2>(b - turn * a)};
+}
+
+double rms(const std::vector<Vector<2>>& from, const std::vector<Vector<2>>& to, const SE2& by) {
+  double sum = 0;
+  for (std::size_t i = 0; i < from.size(); ++i) sum += (by * from[i] - to[i]).squaredNorm();
+  return std::sqrt(sum / static_cast<double>(from.size()));
+}
+
+std::vector<Vector<2>> places_of(const std::vector<StampedPose2>& path) {
+  std::vector<Vector<2>> places;
+  for (const StampedPose2& p : path) places.push_back(p.pose.translation());
+  return places;
+}
+
+void measure(Results& r, const LandmarkLog& log) {
+  measure_path(r, log);
+  measure_landmarks(r, log);
+  measure_gps(r, log);
+}
+
+}  // namespace fastslam
