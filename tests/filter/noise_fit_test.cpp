@@ -10,6 +10,7 @@
 #include <cairn/core/random.hpp>
 #include <cairn/filter/kalman.hpp>
 #include <cairn/filter/noise_fit.hpp>
+#include <cairn/filter/square_root.hpp>
 #include <cairn/models/linear.hpp>
 
 #include "filter/linear_problems.hpp"
@@ -98,6 +99,8 @@ TEST_SUITE("noise_fit") {
     record.prior.covariance(0) = -0.5;  // the first prediction makes a covariance of it, smoothing cannot
     CHECK(cairn::fit_noise(record, level, flow, {.tolerance = 1e-3, .process = false}).status ==
           Status::not_positive_definite);
+    // its belief would throw
+    CHECK(cairn::fit_noise<cairn::SquareRoot>(record, level, flow).status == Status::not_positive_definite);
     record.prior.covariance(0) = std::nan("");
     CHECK(cairn::fit_noise(record, level, flow).status == Status::not_finite);
   }
