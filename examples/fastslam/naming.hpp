@@ -66,9 +66,10 @@ struct Reading {
 
 /// After each of the widest gaps, by how uncertain the motion over them is: the rest of the path moved so
 /// that one or two of the first things that were seen then are landmarks that were seen before, any that the
-/// motion allows. The `most` likeliest, each not optimised. Particles come back from a gap where their own
-/// draws put them, and once all of them have taken one post for its neighbour, none will ever tell. O(gaps
-/// landmarks frames log landmarks). The same for any number of threads.
+/// motion allows, and then laid onto the landmarks by all that was seen in the next hundred frames. The
+/// `most` likeliest, the path otherwise as it was. Particles come back from a gap where their own draws put
+/// them, and once all of them have taken one post for its neighbour, none will ever tell. O(gaps landmarks^2
+/// (frames log landmarks + landmarks)) at most. The same for any number of threads.
 [[nodiscard]] std::vector<Reading> rereadings(const LandmarkLog& log, const std::vector<cairn::SE2>& poses,
                                               const Map& empty, unsigned threads, std::size_t most);
 

@@ -164,6 +164,54 @@ TEST_SUITE("fastslam/naming") {
     CHECK(rereadings(log, path, empty_map(log), 1, 3)[0].log_density == readings[0].log_density);
   }
 
+  TEST_CASE("fastslam: how far the path has to be moved is found by all that is seen after the gap") {
+    LandmarkLog log{.sensor = {.range_sigma = 0.2, .bearing_sigma = 0.05, .farthest = 20, .half_view = 3.2}};
+    const Vector<2> posts[] = {{0, 3}, {2, 4}, {5, 3}, {6, -1}, {3, -3}, {-1, -3}};
+    cairn::Random random(3);
+    const auto look = [&](const SE2& from) {
+      for (std::uint32_t i = 0; i < 6; ++i) see(log, from, posts[i], i);
+      for (auto& sighting : log.frames.back().seen) {
+        const Vector<2> off(random.normal(0, 0.2), random.normal(0, 0.05));
+        sighting.z = cairn::retract(sighting.z, off);
+      }
+    };
+    const auto add = [&](const SE2& moved, const Matrix<3>& covariance) {
+      log.frames.push_back({static_cast<double>(log.frames.size()), {moved, covariance}, {}});
+    };
+    const Matrix<3> small = 1e-6 * Matrix<3>::Identity();
+    const SE2 on(SO2(), Vector<2>(0.05, 0));
+    SE2 is;
+    std::vector<SE2> truth, path;
+    for (int k = 0; k < 30; ++k) {
+      is = is * on;
+      add(on, small);
+      look(is);
+      truth.push_back(is);
+      path.push_back(is);
+    }
+    // The turn was 1.4 rad; odometry says, and the path has it, 0.6 too much and half a metre off.
+    add(SE2(SO2(2.0), Vector<2>(1, 0.5)), Vector<3>(0.1, 0.1, 0.1).asDiagonal());
+    is = is * SE2(SO2(1.4), Vector<2>(1, 0));
+    SE2 off = path.back() * log.frames.back().moved.mean;
+    look(is);
+    truth.push_back(is);
+    path.push_back(off);
+    for (int k = 0; k < 60; ++k) {
+      is = is * on;
+      off = off * on;
+      add(on, small);
+      look(is);
+      truth.push_back(is);
+      path.push_back(off);
+    }
+    log.withhold_identities();
+    const auto readings = rereadings(log, path, empty_map(log), 1, 3);
+    REQUIRE(!readings.empty());
+    // By the first three things that were seen alone: 0.2 m and 0.04 rad.
+    CHECK((readings[0].poses.back().translation() - truth.back().translation()).norm() < 0.06);
+    CHECK(std::abs((readings[0].poses.back().rotation().inverse() * truth.back().rotation()).angle()) < 0.02);
+  }
+
   TEST_CASE("fastslam: a robot that is blind between its views finds out which posts it came back to") {
     double known = 0, withheld = 0;
     for (const std::uint64_t seed : {5U, 9U}) {
