@@ -7,7 +7,6 @@
 #include <cmath>
 #include <ctime>
 #include <memory>
-#include <numeric>
 #include <optional>
 #include <utility>
 

@@ -87,11 +87,10 @@ TEST_SUITE("fastslam/slam") {
     for (int run = 0; run < 20; ++run) {
       Results r{.identities_known = false};
       const SE2 frame(cairn::SO2(random.uniform(-3, 3)), Vector<2>(random.uniform(-50, 50), 7));
-      double sum = 0;
       for (std::uint32_t i = 0; i < 30; ++i) {
         r.true_landmarks.emplace_back(random.uniform(0, 60), random.uniform(0, 40));
-        const Vector<2> off(i % 2 == 0 ? 0.02 : -0.02,
-                            0);  // too little to be of a neighbour, turned by nothing
+        // too little to be of a neighbour, turned by nothing
+        const Vector<2> off(i % 2 == 0 ? 0.02 : -0.02, 0);
         r.landmarks.push_back(
             {i, {Vector<2>(frame * (r.true_landmarks.back() + off)), Matrix<2>::Identity()}, 10 + i, 0});
       }
@@ -100,7 +99,7 @@ TEST_SUITE("fastslam/slam") {
       double nearest = 1e9;
       for (const Vector<2>& t : r.true_landmarks) nearest = std::min(nearest, (t - ghost).norm());
       r.landmarks.push_back({30, {Vector<2>(frame * ghost), Matrix<2>::Identity()}, 3, 0});
-      sum = 30 * 0.02 * 0.02 + nearest * nearest;
+      const double sum = 30 * 0.02 * 0.02 + nearest * nearest;
       measure(r, LandmarkLog{});
       REQUIRE(r.landmark_error.has_value());
       CHECK(*r.landmark_error == doctest::Approx(std::sqrt(sum / 31)).epsilon(0.01));
