@@ -117,18 +117,7 @@ EurocCamera read_camera(const Path& file) {
   const std::vector<double> pose = sensor.list("T_BS", 16, 16);
   cairn::Matrix<4> T;
   for (int i = 0; i < 16; ++i) T(i / 4, i % 4) = pose[static_cast<std::size_t>(i)];
-  cairn::PinholeParameters p;
-  p.fx = k[0];
-  p.fy = k[1];
-  p.cx = k[2];
-  p.cy = k[3];
-  p.k1 = d[0];
-  p.k2 = d[1];
-  p.p1 = d[2];
-  p.p2 = d[3];
-  p.k3 = d[4];
-  p.width = image_side(size[0], file);
-  p.height = image_side(size[1], file);
+  const cairn::PinholeParameters p = pinhole({k[0], k[1], k[2], k[3]}, d, size, file);
   try {
     return {cairn::PinholeCamera(p), cairn::SE3::from_matrix(T)};
   } catch (const cairn::Error& error) {

@@ -47,19 +47,7 @@ cairn::PinholeCamera raw_camera(const KeyedNumbers& calibration, const Path& fil
   const std::vector<double>& k = calibration.at("K_" + camera, 9);
   const std::vector<double>& d = calibration.at("D_" + camera, 5);
   const std::vector<double>& size = calibration.at("S_" + camera, 2);
-  cairn::PinholeParameters p;
-  p.fx = k[0];
-  p.fy = k[4];
-  p.cx = k[2];
-  p.cy = k[5];
-  p.k1 = d[0];
-  p.k2 = d[1];
-  p.p1 = d[2];
-  p.p2 = d[3];
-  p.k3 = d[4];
-  p.width = image_side(size[0], file);
-  p.height = image_side(size[1], file);
-  return cairn::PinholeCamera(p);
+  return cairn::PinholeCamera(pinhole({k[0], k[4], k[2], k[5]}, d, size, file));
 }
 
 // What `make` makes of a file; where it throws, what it says is said of the file.

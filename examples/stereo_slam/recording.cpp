@@ -130,12 +130,26 @@ std::vector<std::filesystem::path> image_files(const std::filesystem::path& fold
   return files;
 }
 
-int image_side(double value, const std::filesystem::path& file) {
-  constexpr double longest = 65536;
-  if (!(value >= 1 && value <= longest))
-    cairn::raise(file.string() + ": expected an image size of 1 to 65536 pixels a side, found " +
-                 cairn::shortest(value));
-  return static_cast<int>(std::lround(value));
+cairn::PinholeParameters pinhole(const std::array<double, 4>& lens, const std::vector<double>& distortion,
+                                 const std::vector<double>& size, const std::filesystem::path& file) {
+  const auto side = [&](double value) {
+    constexpr double longest = 65536;
+    if (!(value >= 1 && value <= longest))
+      cairn::raise(file.string() + ": expected an image size of 1 to 65536 pixels a side, found " +
+                   cairn::shortest(value));
+    return static_cast<int>(std::lround(value));
+  };
+  return {.fx = lens[0],
+          .fy = lens[1],
+          .cx = lens[2],
+          .cy = lens[3],
+          .k1 = distortion[0],
+          .k2 = distortion[1],
+          .p1 = distortion[2],
+          .p2 = distortion[3],
+          .k3 = distortion[4],
+          .width = side(size[0]),
+          .height = side(size[1])};
 }
 
 std::optional<std::size_t> number_of(const std::filesystem::path& file) {

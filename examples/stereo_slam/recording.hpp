@@ -5,6 +5,7 @@
 /// Recorded drives: what the readers of the public formats have in common.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <filesystem>
 #include <map>
@@ -12,6 +13,8 @@
 #include <optional>
 #include <string>
 #include <vector>
+
+#include <cairn/geometry/camera.hpp>
 
 #include "dataset.hpp"
 
@@ -75,8 +78,12 @@ struct ImageGlobs {
 /// Throws unless `folder` is one; `expected` says what should be in it.
 void require_folder(const std::filesystem::path& folder, const std::string& expected);
 
-/// A side of an image [pixels] as a calibration says it. Throws naming the file unless it is a sensible one.
-[[nodiscard]] int image_side(double value, const std::filesystem::path& file);
+/// A camera as calibrations say it: fx, fy, cx, cy; k1, k2, p1, p2, k3; width and height [pixels]. Throws
+/// naming the file unless the size is a sensible one.
+[[nodiscard]] cairn::PinholeParameters pinhole(const std::array<double, 4>& lens,
+                                               const std::vector<double>& distortion,
+                                               const std::vector<double>& size,
+                                               const std::filesystem::path& file);
 
 /// The number that a file's name is ("000012.png" is 12), or nothing.
 [[nodiscard]] std::optional<std::size_t> number_of(const std::filesystem::path& file);

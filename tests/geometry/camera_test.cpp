@@ -13,6 +13,7 @@
 #include <cairn/manifold/derivatives.hpp>
 
 #include "support/random.hpp"
+#include "support/rigs.hpp"
 
 namespace camera_test {
 namespace {
@@ -21,18 +22,8 @@ using cairn::PinholeCamera;
 using cairn::PinholeParameters;
 using cairn::Vector;
 
-/// An unrectified camera of KITTI, and the same with the opposite curvature.
-const PinholeParameters barrel{.fx = 984.2,
-                               .fy = 980.8,
-                               .cx = 690,
-                               .cy = 233.2,
-                               .k1 = -0.3728755,
-                               .k2 = 0.2037299,
-                               .p1 = 0.002219,
-                               .p2 = 0.001383,
-                               .k3 = -0.07233722,
-                               .width = 1392,
-                               .height = 512};
+/// A lens that draws inwards, and one with the opposite curvature.
+constexpr PinholeParameters barrel = cairn_test::unrectified_camera;
 const PinholeParameters cushion{
     .fx = 500, .fy = 520, .cx = 320, .cy = 240, .k1 = 0.2, .k2 = 0.05, .width = 640, .height = 480};
 

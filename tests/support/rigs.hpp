@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <cairn/core/random.hpp>
+#include <cairn/geometry/camera.hpp>
 #include <cairn/geometry/stereo_pose.hpp>
 #include <cairn/geometry/stereo_rig.hpp>
 
@@ -22,19 +23,22 @@ inline cairn::StereoRig rectified_rig(double baseline = 0.2) {
   return {camera, camera, cairn::SE3(cairn::SO3(), cairn::Vector<3>(baseline, 0, 0))};
 }
 
+/// A camera of KITTI before rectification.
+inline constexpr cairn::PinholeParameters unrectified_camera{.fx = 984.2,
+                                                             .fy = 980.8,
+                                                             .cx = 690,
+                                                             .cy = 233.2,
+                                                             .k1 = -0.3728755,
+                                                             .k2 = 0.2037299,
+                                                             .p1 = 0.002219,
+                                                             .p2 = 0.001383,
+                                                             .k3 = -0.07233722,
+                                                             .width = 1392,
+                                                             .height = 512};
+
 /// A rig like KITTI's before rectification: distorted, turned by a degree, shifted in all three axes.
 inline cairn::StereoRig unrectified_rig() {
-  const cairn::PinholeCamera left({.fx = 984.2,
-                                   .fy = 980.8,
-                                   .cx = 690,
-                                   .cy = 233.2,
-                                   .k1 = -0.3728755,
-                                   .k2 = 0.2037299,
-                                   .p1 = 0.002219,
-                                   .p2 = 0.001383,
-                                   .k3 = -0.07233722,
-                                   .width = 1392,
-                                   .height = 512});
+  const cairn::PinholeCamera left(unrectified_camera);
   const cairn::PinholeCamera right({.fx = 989.5,
                                     .fy = 987.8,
                                     .cx = 702,
