@@ -139,12 +139,28 @@ BatchOptimum batch_optimum(const LandmarkLog& log, const std::vector<SE2>& start
   return {std::move(best.at.poses), std::move(best.at.landmarks), best.cost, best.iterations, best.converged};
 }
 
-BatchOptimum doubting_batch_optimum(LandmarkLog& log, const std::vector<SE2>& start) {
-  static const double most = cairn::chi_square_quantile(1 - 1e-7, 2);
+namespace {
+
+/// An optimum without the names that it contradicts, and what both are worth together: less is likelier.
+struct Doubting {
+  BatchOptimum optimum;
+  double cost = 0;
+  std::size_t last = 0;  ///< frame beyond the last one with a name that is doubted; 0: none is
+};
+
+const double most_off = cairn::chi_square_quantile(1 - 1e-7, 2);
+
+Doubting doubting(LandmarkLog& log, const std::vector<SE2>& start) {
   constexpr int most_rounds = 50;
-  BatchOptimum optimum = batch_optimum(log, start);
+  Doubting result{batch_optimum(log, start)};
+  BatchOptimum& optimum = result.optimum;
   for (int round = 0; round < most_rounds; ++round) {
-    std::vector<std::pair<double, Map::Sighting*>> off;  // squared, in sigmas
+    struct Off {
+      double squared;  // in sigmas
+      Map::Sighting* sighting;
+      std::size_t frame;
+    };
+    std::vector<Off> off;
     double worst = 0;
     for (std::size_t k = 0; k < log.frames.size(); ++k)
       for (auto& sighting : log.frames[k].seen) {
@@ -152,27 +168,64 @@ BatchOptimum doubting_batch_optimum(LandmarkLog& log, const std::vector<SE2>& st
         const auto& [e, noise] =
             error_of(log.sensor, optimum.poses[k], optimum.landmarks.at(*sighting.identity), sighting);
         const double squared = cairn::Cholesky<2>(noise).whiten(e).squaredNorm();
-        if (squared > most) off.emplace_back(squared, &sighting);
+        if (squared > most_off) off.push_back({squared, &sighting, k});
         worst = std::max(worst, squared);
       }
     if (off.empty()) break;
-    for (const auto& [squared, sighting] : off)
-      if (squared >= worst / 4) sighting->identity.reset();
+    for (const auto& [squared, sighting, frame] : off) {
+      if (squared < worst / 4) continue;
+      sighting->identity.reset();
+      result.cost += 0.5 * most_off;
+      result.last = std::max(result.last, frame + 1);
+    }
+    // What was read wrongly may have bent the path: from the start as well.
     optimum = batch_optimum(log, optimum.poses);
+    if (BatchOptimum again = batch_optimum(log, start); again.cost < optimum.cost) optimum = std::move(again);
   }
-  return optimum;
+  result.cost += optimum.cost;
+  return result;
+}
+
+/// Adds frames of a log to its first ones, and poses by odometry to theirs.
+void grow(LandmarkLog& part, std::vector<SE2>& poses, const LandmarkLog& log, std::size_t by) {
+  const std::size_t end = std::min(part.frames.size() + std::max<std::size_t>(1, by), log.frames.size());
+  for (std::size_t k = part.frames.size(); k < end; ++k) {
+    part.frames.push_back(log.frames[k]);
+    const SE2& moved = log.frames[k].moved.mean;
+    poses.push_back(poses.empty() ? moved : poses.back() * moved);
+  }
+}
+
+}  // namespace
+
+BatchOptimum doubting_batch_optimum(LandmarkLog& log, const std::vector<SE2>& start, std::size_t settled) {
+  constexpr std::size_t by = 25;
+  LandmarkLog believed = log;
+  Doubting best = doubting(believed, start);
+  if (settled > 0 && best.last > settled) {
+    const auto count = static_cast<std::ptrdiff_t>(settled);
+    LandmarkLog part{.name = log.name, .sensor = log.sensor};
+    part.frames.assign(log.frames.begin(), log.frames.begin() + count);
+    std::vector<SE2> poses(start.begin(), start.begin() + count);
+    while (part.frames.size() < log.frames.size()) {
+      grow(part, poses, log, by);
+      poses = doubting(part, poses).optimum.poses;
+    }
+    part.frames = log.frames;
+    if (Doubting grown = doubting(part, poses); grown.cost < best.cost) {
+      best = std::move(grown);
+      believed.frames = std::move(part.frames);
+    }
+  }
+  log.frames = std::move(believed.frames);
+  return std::move(best.optimum);
 }
 
 BatchOptimum growing_batch_optimum(const LandmarkLog& log, std::size_t by) {
   LandmarkLog part{.name = log.name, .sensor = log.sensor};
   BatchOptimum best;
   while (part.frames.size() < log.frames.size()) {
-    const std::size_t end = std::min(part.frames.size() + std::max<std::size_t>(1, by), log.frames.size());
-    for (std::size_t k = part.frames.size(); k < end; ++k) {
-      part.frames.push_back(log.frames[k]);
-      const SE2& moved = log.frames[k].moved.mean;
-      best.poses.push_back(best.poses.empty() ? moved : best.poses.back() * moved);
-    }
+    grow(part, best.poses, log, by);
     best = batch_optimum(part, best.poses);
   }
   return best;

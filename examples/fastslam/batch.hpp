@@ -36,8 +36,12 @@ struct BatchOptimum {
 /// The same without the names that all else contradicts, which the log then no longer has: bar codes are read
 /// wrongly, and one that is 60 sigma off bends a whole path. The worst is left out first, with what is half
 /// as far off, and the rest solved again, until what is left is off by no more than one sighting in ten
-/// million that are right.
-[[nodiscard]] BatchOptimum doubting_batch_optimum(LandmarkLog& log, const std::vector<cairn::SE2>& start);
+/// million that are right. So many of the start's first poses are `settled`, near the optimum. Where
+/// something beyond is left out, what was read wrongly may have bent the rest of the start so far that there
+/// is no way back from it: then more and more frames are also added to the settled ones, and the likelier is
+/// taken.
+[[nodiscard]] BatchOptimum doubting_batch_optimum(LandmarkLog& log, const std::vector<cairn::SE2>& start,
+                                                  std::size_t settled = 0);
 
 /// The same of the log's first frames and then of more and more, each begun where the last ended and moved on
 /// by odometry: no start is needed, and drift does not grow before a loop corrects it.

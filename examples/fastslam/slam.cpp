@@ -160,7 +160,8 @@ private:
     const bool is_named = all_named(log_, frames_, options_.landmarks);
     const std::size_t asked = is_named ? 1 : 16;
     const std::vector<SE2> best = means_of(belief, belief.best());
-    for (std::size_t k = start.size(); k < frames_; ++k)
+    const std::size_t settled = start.size();
+    for (std::size_t k = settled; k < frames_; ++k)
       start.push_back(k == 0 ? best[0] : start[k - 1] * best[k - 1].inverse() * best[k]);
     cairn::Random choice(~options_.seed, (frames_ << 32U) + belief.size());
     std::optional<LandmarkLog> believed;
@@ -168,7 +169,7 @@ private:
     if (is_named) {
       const auto end = log_.frames.begin() + static_cast<std::ptrdiff_t>(frames_);
       believed = LandmarkLog{.name = log_.name, .sensor = log_.sensor, .frames = {log_.frames.begin(), end}};
-      best_of_believed = doubting_batch_optimum(*believed, start);
+      best_of_believed = doubting_batch_optimum(*believed, start, settled);
       doubted_ = unnamed_in(*believed);
     }
     std::vector<std::vector<cairn::Association>> seen;
