@@ -2,8 +2,10 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
+#include <deque>
 #include <filesystem>
 #include <initializer_list>
+#include <iterator>
 #include <numeric>
 #include <set>
 #include <string>
@@ -98,66 +100,138 @@ private:
   }
 };
 
-/// Metres and radians that odometry has gone and turned until a time.
+/// How odometry differs from what the robot does: turns on the spot err by another factor than curves.
+struct WheelErrors {
+  double delay = 0;                       ///< [s] that the robot moves later than odometry says so
+  double turn = 1, turn_on_the_spot = 1;  ///< what it turns where odometry says one
+
+  bool operator==(const WheelErrors&) const = default;
+};
+
+bool is_on_the_spot(const Row& odometry) {
+  constexpr double slowest = 0.01;  // [m/s]
+  return std::abs(odometry[1]) < slowest;
+}
+
+/// Metres gone, radians turned on the way and radians turned on the spot, by odometry until a time.
 class Gone {
 public:
   explicit Gone(const std::vector<Row>& odometry) : odometry_(odometry) {
-    for (std::size_t i = 0; i + 1 < odometry.size(); ++i) {
-      const double dt = odometry[i + 1][0] - odometry[i][0];
-      until_.emplace_back(until_.back() + dt * Vector<2>(odometry[i][1], odometry[i][2]));
-    }
+    for (std::size_t i = 0; i + 1 < odometry.size(); ++i)
+      until_.emplace_back(until_.back() + (odometry[i + 1][0] - odometry[i][0]) * rates(odometry[i]));
   }
-  [[nodiscard]] Vector<2> until(double time) const {
+  [[nodiscard]] Vector<3> until(double time) const {
     const auto after = std::ranges::upper_bound(odometry_, time, {}, [](const Row& r) { return r[0]; });
-    if (after == odometry_.begin()) return Vector<2>::Zero();
+    if (after == odometry_.begin()) return Vector<3>::Zero();
     const auto i = static_cast<std::size_t>(after - odometry_.begin()) - 1;
     if (after == odometry_.end()) return until_[i];
-    return until_[i] + (time - odometry_[i][0]) * Vector<2>(odometry_[i][1], odometry_[i][2]);
+    return until_[i] + (time - odometry_[i][0]) * rates(odometry_[i]);
   }
 
 private:
+  static Vector<3> rates(const Row& r) {
+    return is_on_the_spot(r) ? Vector<3>(r[1], 0, r[2]) : Vector<3>(r[1], r[2], 0);
+  }
+
   const std::vector<Row>& odometry_;
-  std::vector<Vector<2>> until_{Vector<2>::Zero()};
+  std::vector<Vector<3>> until_{Vector<3>::Zero()};
 };
 
-/// How much later than odometry says so the robot moves [s], by which the bearings of a bar code change, from
-/// one sighting to the next within a second, most nearly as the wheels went: to a hundredth of a second, by
-/// the least sum of errors, which a code that is read wrongly does not pull at. 0 where few were seen twice.
-double delay_of(const Files& files) {
-  constexpr std::size_t enough = 100;
-  struct Pair {
-    double from, to;
-    Vector<2> place;  // from the robot, at first
-    double bearing;   // then
-  };
-  std::vector<Pair> pairs;
-  std::map<int, const Row*> last;
-  for (const Row& seen : files.sightings) {
-    const Row*& before = last[static_cast<int>(seen[1])];
-    if (before != nullptr && seen[0] > (*before)[0] && seen[0] - (*before)[0] <= 1)
-      pairs.push_back({(*before)[0], seen[0],
-                       (*before)[2] * Vector<2>(std::cos((*before)[3]), std::sin((*before)[3])), seen[3]});
-    before = &seen;
-  }
-  if (pairs.size() < enough) return 0;
-  const Gone gone(files.odometry);
-  const auto off = [&](double delay) {
-    double sum = 0;
-    for (const Pair& p : pairs) {
-      const Vector<2> moved = gone.until(p.to - delay) - gone.until(p.from - delay);
-      const Vector<2> then = SE2::exp(cairn::Vector<3>(moved(0), 0, moved(1))).inverse() * p.place;
-      sum += std::abs(cairn::SO2(p.bearing - std::atan2(then(1), then(0))).angle());
+/// A bar code seen at two times.
+struct SeenTwice {
+  double from, to;
+  Vector<2> place;  // from the robot, at first
+  double bearing;   // then
+};
+
+/// Each sighting with the last one of the same code that is `least` to `most` seconds before it.
+std::vector<SeenTwice> seen_twice(const std::vector<Row>& sightings, double least, double most) {
+  std::vector<SeenTwice> pairs;
+  std::map<int, std::deque<const Row*>> sightings_of;  // not older than that
+  for (const Row& seen : sightings) {
+    std::deque<const Row*>& before = sightings_of[static_cast<int>(seen[1])];
+    while (!before.empty() && seen[0] - (*before.front())[0] > most) before.pop_front();
+    const auto too_late = std::ranges::partition_point(
+        before, [&](const Row* row) { return seen[0] > (*row)[0] && seen[0] - (*row)[0] >= least; });
+    if (too_late != before.begin()) {
+      const Row& first = **std::prev(too_late);
+      const Vector<2> place = first[2] * Vector<2>(std::cos(first[3]), std::sin(first[3]));
+      pairs.push_back({first[0], seen[0], place, seen[3]});
     }
-    return sum;
+    before.push_back(&seen);
+  }
+  return pairs;
+}
+
+/// What odometry says of the robot between the two sightings.
+Vector<3> gone_between(const SeenTwice& pair, const Gone& gone, double delay) {
+  return gone.until(pair.to - delay) - gone.until(pair.from - delay);
+}
+
+/// How far the bearings of codes that were seen twice are from where wheels with these errors would have
+/// turned them [rad]: the sum, which a code that is read wrongly does not pull at.
+double sum_of_errors(const std::vector<SeenTwice>& pairs, const Gone& gone, const WheelErrors& wheels) {
+  double sum = 0;
+  for (const SeenTwice& p : pairs) {
+    const Vector<3> moved = gone_between(p, gone, wheels.delay);
+    const double turned = wheels.turn * moved(1) + wheels.turn_on_the_spot * moved(2);
+    const Vector<2> then = SE2::exp(Vector<3>(moved(0), 0, turned)).inverse() * p.place;
+    sum += std::abs(cairn::SO2(p.bearing - std::atan2(then(1), then(0))).angle());
+  }
+  return sum;
+}
+
+/// By the codes that the robot sees twice: the delay to a hundredth of a second and the turns to a
+/// thousandth, each by the least sum of errors with the others as they are, until all stay. Sightings that
+/// follow one another tell the delay; of the turns they have too little, and the jitter of their times makes
+/// these look smaller than they are: over a second it does not. Where too little was seen of one, odometry is
+/// believed.
+WheelErrors wheel_errors(const Files& files) {
+  constexpr std::size_t enough = 100, enough_turned = 30;
+  constexpr double turned = 0.1;  // [rad]
+  constexpr int most_rounds = 10;
+  const std::vector<SeenTwice> soon = seen_twice(files.sightings, 0, 1);
+  const std::vector<SeenTwice> later = seen_twice(files.sightings, 1, 2);
+  const Gone gone(files.odometry);
+  // The best of middle + i step, |i| <= reach; of two as good the one nearer to the middle.
+  const auto best = [&](const auto& pairs, const auto& with, int middle, int step, int reach) {
+    int found = middle;
+    double least = sum_of_errors(pairs, gone, with(middle));
+    for (int i = 1; i <= reach; ++i)
+      for (const int value : {middle + i * step, middle - i * step})
+        if (const double sum = sum_of_errors(pairs, gone, with(value)); sum < least) {
+          least = sum;
+          found = value;
+        }
+    return found;
   };
-  double best = 0, least = off(0);
-  for (int hundredths = 1; hundredths <= 50; ++hundredths)
-    for (const double delay : {0.01 * hundredths, -0.01 * hundredths})
-      if (const double sum = off(delay); sum < least) {
-        least = sum;
-        best = delay;
-      }
-  return best;
+  const auto has_turned = [&](int kind, double delay) {
+    const auto has = [&](const SeenTwice& p) {
+      return std::abs(gone_between(p, gone, delay)(kind)) > turned;
+    };
+    return static_cast<std::size_t>(std::ranges::count_if(later, has)) >= enough_turned;
+  };
+  WheelErrors now;
+  for (int round = 0; round < most_rounds; ++round) {
+    const WheelErrors before = now;
+    const auto set = [&](double WheelErrors::* which, double to) {
+      WheelErrors wheels = now;
+      wheels.*which = to;
+      return wheels;
+    };
+    if (soon.size() >= enough) {
+      const auto delayed = [&](int hundredths) { return set(&WheelErrors::delay, hundredths / 100.0); };
+      now = delayed(best(soon, delayed, 0, 1, 50));
+    }
+    int kind = 1;
+    for (const auto which : {&WheelErrors::turn, &WheelErrors::turn_on_the_spot}) {
+      if (!has_turned(kind++, now.delay)) continue;
+      const auto turning = [&](int thousandths) { return set(which, thousandths / 1000.0); };
+      now = turning(best(later, turning, best(later, turning, 1000, 20, 30), 1, 20));
+    }
+    if (now == before) break;
+  }
+  return now;
 }
 
 /// Odometry turned into motions between frames.
@@ -170,12 +244,16 @@ public:
 
   void move(double to) {
     if (to <= time_) return;
-    const cairn::Status status = cairn::Extended{}.predict(moved_, process, to - time_, control_);
+    const cairn::Status status = cairn::Extended{}.predict(moved_, process_, to - time_, control_);
     if (status != cairn::Status::accepted)
       cairn::raise(file_.string() + ": the motion until " + cairn::shortest(to) + " s: " + explain(status));
     time_ = to;
   }
-  void steer(double speed, double turn) { control_ = Vector<2>(speed, turn); }
+  void steer(const Row& odometry) {
+    control_ = Vector<2>(odometry[1], odometry[2]);
+    process_.turn_density =
+        turn_density + (is_on_the_spot(odometry) ? on_the_spot * std::abs(odometry[2]) : 0);
+  }
   void between() {
     if (!log_.frames.empty()) log_.between.push_back({time_, log_.frames.size() - 1, moved_.mean});
   }
@@ -188,8 +266,9 @@ public:
 
 private:
   // Against the truth, distance over 5 s errs by 0.04 m and the turn by 0.08 to 0.11 rad: as white noise,
-  // densities of 3e-4 and 2e-3. Errors that last want a little more than that.
-  static constexpr cairn::Unicycle process{.speed_density = 1e-3, .slip_density = 3e-5, .turn_density = 3e-3};
+  // densities of 3e-4 and 2e-3. Errors that last want a little more than that. A turn on the spot, where
+  // wheels slip, adds 0.026 (over 1 s) to 0.066 (over 10 s) rad^2 for each radian.
+  static constexpr double turn_density = 3e-3, on_the_spot = 0.02;
 
   void reset() { moved_ = {SE2(), cairn::Matrix<3>::Zero()}; }
 
@@ -197,6 +276,7 @@ private:
   std::filesystem::path file_;  // for messages
   double time_;
   Vector<2> control_ = Vector<2>::Zero();
+  cairn::Unicycle process_{.speed_density = 1e-3, .slip_density = 3e-5, .turn_density = turn_density};
   cairn::Gaussian<SE2> moved_;
 };
 
@@ -207,8 +287,11 @@ LandmarkLog read_mrclam(const std::filesystem::path& folder, int robot) {
   Files files(folder, name);
   if (files.odometry.empty())
     cairn::raise((folder / name).string() + "_Odometry.dat: expected odometry, found none");
-  const double delay = delay_of(files);
-  for (Row& r : files.odometry) r[0] += delay;
+  const WheelErrors wheel = wheel_errors(files);
+  for (Row& r : files.odometry) {
+    r[0] += wheel.delay;
+    r[2] *= is_on_the_spot(r) ? wheel.turn_on_the_spot : wheel.turn;
+  }
   LandmarkLog log{
       .name = "UTIAS " + folder.filename().string() + ", robot " + std::to_string(robot),
       // A bar code faces one way, and what the camera does not read says nothing.
@@ -238,7 +321,7 @@ LandmarkLog read_mrclam(const std::filesystem::path& folder, int robot) {
     }
     wheels.move(o[0]);
     wheels.between();
-    wheels.steer(o[1], o[2]);
+    wheels.steer(o);
   }
   outside += files.sightings.size() - next;
   if (log.frames.empty())
@@ -248,9 +331,13 @@ LandmarkLog read_mrclam(const std::filesystem::path& folder, int robot) {
                         std::to_string(outside));
   for (const int code : unknown)
     log.notes.push_back("bar code " + std::to_string(code) + " belongs to nothing of the set: left out");
-  if (delay != 0)
-    log.notes.push_back("the robot moves " + cairn::shortest(delay) +
+  if (wheel.delay != 0)
+    log.notes.push_back("the robot moves " + cairn::shortest(wheel.delay) +
                         " s later than odometry says: odometry is taken for that");
+  for (const auto& [turn, where] : {std::pair(wheel.turn, ""), {wheel.turn_on_the_spot, " on the spot"}})
+    if (turn != 1)
+      log.notes.push_back("the robot turns " + cairn::shortest(turn) + " times as far" + where +
+                          " as odometry says: odometry is taken for that");
   return log;
 }
 
