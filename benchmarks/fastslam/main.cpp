@@ -67,10 +67,7 @@ Runs runs_of(const LandmarkLog& log, std::size_t particles) {
     const Results r = run(log, options_of(particles, seed));
     runs.path.push_back(*r.path_error);
     runs.landmarks.push_back(r.landmark_error.value_or(0));
-    std::vector<double> nees;
-    for (const StepRecord& step : r.steps)
-      if (step.nees) nees.push_back(*step.nees);
-    runs.nees.push_back(median(nees));
+    runs.nees.push_back(r.median_nees.value_or(0));
     std::cerr << log.name << ", seed " << seed << ": path " << runs.path.back() << " m, landmarks "
               << runs.landmarks.back() << " m, NEES " << runs.nees.back() << ", " << r.cpu_seconds << " s\n";
   }

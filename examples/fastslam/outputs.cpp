@@ -235,6 +235,7 @@ std::string summary(const Results& r) {
   json["path_rms_m"] = json_of(r.path_error);
   json["odometry_rms_m"] = json_of(r.odometry_error);
   json["landmarks_rms_m"] = json_of(r.landmark_error);
+  json["pose_nees_median"] = json_of(r.median_nees);
   json["gps_median_m"] = json_of(r.gps_median);
   json["notes"] = r.notes;
   json["ended_early"] = r.ended_early ? Json(*r.ended_early) : Json(nullptr);
@@ -252,6 +253,9 @@ std::optional<std::string> report(const Results& r) {
   if (r.path_error)
     page.figure({"Path", readable(*r.path_error), "m",
                  "root mean square after a rigid fit; odometry " + readable(*r.odometry_error) + " m"});
+  if (r.median_nees)
+    page.figure({"NEES", readable(*r.median_nees), "",
+                 "of the pose, median of the frames; 2.4 where its covariance is right"});
   if (r.landmark_error)
     page.figure({"Landmarks' error", readable(*r.landmark_error), "m", "root mean square after a rigid fit"});
   add_map(page, r);

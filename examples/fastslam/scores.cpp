@@ -11,6 +11,8 @@
 #include <optional>
 #include <utility>
 
+#include <cairn/core/statistics.hpp>
+
 namespace fastslam {
 
 namespace {
@@ -183,6 +185,10 @@ std::vector<Vector<2>> places_of(const std::vector<StampedPose2>& path) {
 
 void measure(Results& r, const LandmarkLog& log) {
   measure_path(r, log);
+  std::vector<double> nees;
+  for (const StepRecord& step : r.steps)
+    if (step.nees) nees.push_back(*step.nees);
+  if (!nees.empty()) r.median_nees = cairn::median(std::move(nees));
   measure_landmarks(r, log);
   measure_gps(r, log);
 }

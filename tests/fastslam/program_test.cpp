@@ -90,6 +90,10 @@ TEST_SUITE("fastslam/program") {
     const auto summary = nlohmann::json::parse(cairn::read_file(folder / "1" / "summary.json"));
     CHECK(summary["frames"] == 60);
     CHECK(summary["identities"] == "withheld");
+    CHECK(summary["pose_nees_median"].get<double>() > 0);
+    // and do not make it too sure: 99 % of all are below
+    const auto redrawn = nlohmann::json::parse(cairn::read_file(folder / "known1" / "summary.json"));
+    CHECK(redrawn["pose_nees_median"].get<double>() < 11.3);
     const std::string path = cairn::read_file(folder / "1" / "trajectory.txt");
     CHECK(std::count(path.begin(), path.end(), '\n') == 60);
     const std::string landmarks = cairn::read_file(folder / "1" / "landmarks.csv");
