@@ -57,18 +57,6 @@ std::vector<Vector<2>> first_seen(const LandmarkLog& log, const std::vector<SE2>
   return places;
 }
 
-/// Whether two moves put what was seen at this place at other landmarks.
-bool differ(const SE2& a, const SE2& b, const Vector<2>& place) {
-  return (a * place - b * place).norm() > 0.5 ||
-         std::abs((a.rotation().inverse() * b.rotation()).angle()) > 0.15;
-}
-
-/// Adds a move that differs from all that are there.
-void add_another(std::vector<SE2>& moves, const SE2& move, const Vector<2>& place) {
-  if (std::ranges::all_of(moves, [&](const SE2& other) { return differ(other, move, place); }))
-    moves.push_back(move);
-}
-
 /// How the rest of the path may be moved to take what was seen for landmarks of the map: one thing for one,
 /// without a turn, or two for two that are as far apart.
 std::vector<SE2> moves_onto(const Map& map, const std::vector<Vector<2>>& places, const Gap& gap) {
@@ -78,7 +66,11 @@ std::vector<SE2> moves_onto(const Map& map, const std::vector<Vector<2>>& places
   const auto add = [&](const SE2& move) {
     const double by = (move * places[0] - places[0]).norm(), turn = std::abs(move.rotation().angle());
     if (by > 3 * gap.metres + 2 || turn > 3 * gap.radians || (by < 1 && turn < 0.2)) return;
-    add_another(moves, move, places[0]);
+    const auto differs = [&](const SE2& other) {
+      return (other * places[0] - move * places[0]).norm() > 0.5 ||
+             std::abs((other.rotation().inverse() * move.rotation()).angle()) > 0.15;
+    };
+    if (std::ranges::all_of(moves, differs)) moves.push_back(move);
   };
   for (const Vector<2>& m : landmarks)
     for (const Vector<2>& place : places) add(SE2(cairn::SO2(), m - place));
@@ -261,10 +253,8 @@ std::vector<Reading> rereadings(const LandmarkLog& log, const std::vector<SE2>& 
     if (places.empty()) continue;
     const std::size_t next = g + 1 < gaps.size() ? gaps[g + 1].frame : poses.size();
     const std::vector<Vector<2>> all = places_seen(log, poses, gap.frame, std::min(next, gap.frame + soon));
-    std::vector<SE2> moves{SE2()};  // and those that differ: several may have come to the same
     for (const SE2& move : moves_onto(along.map, places, gap))
-      add_another(moves, refined(along.map, all, move), places[0]);
-    for (std::size_t i = 1; i < moves.size(); ++i) others.push_back({along, moves[i], {}});
+      others.push_back({along, refined(along.map, all, move), {}});
   }
   stand_still(poses.size());
   constexpr double hopeless = 60;  // so far behind the path as it stands, a reading is given up
