@@ -148,9 +148,8 @@ struct Doubting {
   std::size_t last = 0;  ///< frame beyond the last one with a name that is doubted; 0: none is
 };
 
-const double most_off = cairn::chi_square_quantile(1 - 1e-7, 2);
-
 Doubting doubting(LandmarkLog& log, const std::vector<SE2>& start) {
+  static const double most_off = cairn::chi_square_quantile(1 - 1e-7, 2);
   constexpr int most_rounds = 50;
   Doubting result{batch_optimum(log, start)};
   BatchOptimum& optimum = result.optimum;
@@ -187,11 +186,11 @@ Doubting doubting(LandmarkLog& log, const std::vector<SE2>& start) {
 }
 
 /// Adds frames of a log to its first ones, and poses by odometry to theirs.
-void grow(LandmarkLog& part, std::vector<SE2>& poses, const LandmarkLog& log, std::size_t by) {
-  const std::size_t end = std::min(part.frames.size() + std::max<std::size_t>(1, by), log.frames.size());
+void grow(LandmarkLog& part, std::vector<SE2>& poses, const std::vector<Frame>& frames, std::size_t by) {
+  const std::size_t end = std::min(part.frames.size() + std::max<std::size_t>(1, by), frames.size());
   for (std::size_t k = part.frames.size(); k < end; ++k) {
-    part.frames.push_back(log.frames[k]);
-    const SE2& moved = log.frames[k].moved.mean;
+    part.frames.push_back(frames[k]);
+    const SE2& moved = frames[k].moved.mean;
     poses.push_back(poses.empty() ? moved : poses.back() * moved);
   }
 }
@@ -200,24 +199,23 @@ void grow(LandmarkLog& part, std::vector<SE2>& poses, const LandmarkLog& log, st
 
 BatchOptimum doubting_batch_optimum(LandmarkLog& log, const std::vector<SE2>& start, std::size_t settled) {
   constexpr std::size_t by = 25;
-  LandmarkLog believed = log;
-  Doubting best = doubting(believed, start);
+  const std::vector<Frame> as_said = log.frames;
+  Doubting best = doubting(log, start);
   if (settled > 0 && best.last > settled) {
     const auto count = static_cast<std::ptrdiff_t>(settled);
     LandmarkLog part{.name = log.name, .sensor = log.sensor};
-    part.frames.assign(log.frames.begin(), log.frames.begin() + count);
+    part.frames.assign(as_said.begin(), as_said.begin() + count);
     std::vector<SE2> poses(start.begin(), start.begin() + count);
-    while (part.frames.size() < log.frames.size()) {
-      grow(part, poses, log, by);
+    while (part.frames.size() < as_said.size()) {
+      grow(part, poses, as_said, by);
       poses = doubting(part, poses).optimum.poses;
     }
-    part.frames = log.frames;
+    part.frames = as_said;
     if (Doubting grown = doubting(part, poses); grown.cost < best.cost) {
       best = std::move(grown);
-      believed.frames = std::move(part.frames);
+      log.frames = std::move(part.frames);
     }
   }
-  log.frames = std::move(believed.frames);
   return std::move(best.optimum);
 }
 
@@ -225,7 +223,7 @@ BatchOptimum growing_batch_optimum(const LandmarkLog& log, std::size_t by) {
   LandmarkLog part{.name = log.name, .sensor = log.sensor};
   BatchOptimum best;
   while (part.frames.size() < log.frames.size()) {
-    grow(part, best.poses, log, by);
+    grow(part, best.poses, log.frames, by);
     best = batch_optimum(part, best.poses);
   }
   return best;
