@@ -6,6 +6,7 @@ scripts/course in the folder COURSE.
 make_site.py picture PAGE FIGURE WIDTHxHEIGHT PNG: a picture of one figure of a report page, as README.md has one.
 make_site.py links: looks at the links of the documents only, as GitHub shows them. Ends with 1, and a line for each fault, where a link leads nowhere, a picture is missing, a page
 asks for something from a network or is wider than a phone, or Doxygen does not understand a page of docs/."""
+import concurrent.futures
 import csv
 import html
 import html.parser
@@ -244,43 +245,55 @@ def chromium():
 
 
 def screenshot(browser, page_file, query, target, width, height):
-    profile = pathlib.Path(tempfile.gettempdir()) / f"cairn-docs-{os.getpid()}"
-    done = subprocess.run(
-        [browser, "--headless", "--no-sandbox", "--disable-gpu-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
-         "--disable-dev-shm-usage", "--no-first-run", "--hide-scrollbars", "--virtual-time-budget=4000",
-         f"--user-data-dir={profile}", f"--window-size={width},{height}", f"--screenshot={target}",
-         page_file.resolve().as_uri() + query],
-        stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=300)
-    shutil.rmtree(profile, ignore_errors=True)
+    with tempfile.TemporaryDirectory(prefix="cairn-docs-", ignore_cleanup_errors=True) as profile:
+        done = subprocess.run(
+            [browser, "--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage",
+             "--no-first-run", "--hide-scrollbars", "--virtual-time-budget=4000", f"--user-data-dir={profile}",
+             f"--window-size={width},{height}", f"--screenshot={target}",
+             page_file.resolve().as_uri() + query],
+            stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=300)
     return done.returncode == 0 and target.is_file()
 
 
-def lessons(site, course):
-    """The gallery of the course: each lesson's page, and a picture of its first figure."""
+def lesson_folders(course):
+    return sorted(course.glob("[0-9][0-9]_*"))
+
+
+def lesson_pages(site, course, browsing):
+    """Copies each lesson's page, and has a picture of its first figure taken; returns, by name, what will say whether there is one."""
     browser = chromium()
     if browser is None:
         print("docs: no chromium, so the lessons go without pictures", file=sys.stderr)
-    items = []
-    for folder in sorted(course.glob("[0-9][0-9]_*")):
+    pictures = {}
+    for folder in lesson_folders(course):
         target = site / "lessons" / folder.name
         if not (folder / "index.html").is_file():
             sys.exit(f"docs: {folder} has no page: the lessons were built without npm (scripts/install demo)")
         shutil.copytree(folder, target, ignore=shutil.ignore_patterns("mistakes"), dirs_exist_ok=True)
+        if browser:
+            pictures[folder.name] = browsing.submit(screenshot, browser, target / "index.html",
+                                                    f"?theme=light&figure={SHOWN.get(folder.name, 1)}", target / "figure.png", 640, 720)
+    return pictures
+
+
+def gallery(site, course, pictures):
+    """The list of the lessons, with the pictures that are being taken."""
+    items = []
+    for folder in lesson_folders(course):
         about = subprocess.run([str(ROOT / "build/release/examples" / folder.name), "--about"], capture_output=True, text=True,
                                check=True).stdout.splitlines()
         picture = ""
-        if browser and screenshot(browser, target / "index.html", f"?theme=light&figure={SHOWN.get(folder.name, 1)}",
-                                  target / "figure.png", 640, 720):
+        if folder.name in pictures:
             picture = f'<img src="lessons/{folder.name}/figure.png" alt="A figure of the lesson\'s page" width="640" height="720" loading="lazy"/>'
         source = page.source_page(f"examples/{folder.name}/main.cpp")
         items.append(f'<li>{picture}<h2>{html.escape(about[0])}</h2><p>{html.escape(about[1])}</p>'
                      f'<p><a href="lessons/{folder.name}/index.html">Its page</a>, <a href="{source}">the program</a></p></li>')
-    gallery = '<ul class="lessons">' + "\n".join(items) + "</ul>"
+    listed = '<ul class="lessons">' + "\n".join(items) + "</ul>"
     path = site / "course.html"
     text = path.read_text(encoding="utf-8")
     if '<div id="site-course"></div>' not in text:
         sys.exit("docs: docs/course.md has no place for the lessons: <!-- site: course -->")
-    path.write_text(text.replace('<div id="site-course"></div>', gallery), encoding="utf-8")
+    path.write_text(text.replace('<div id="site-course"></div>', listed), encoding="utf-8")
 
 
 # ---------------------------------------------------------------------------------------------------------------- faults
@@ -351,16 +364,21 @@ def readme_faults():
 
 
 PHONE = """<!doctype html>
-<iframe id="phone" width="390" height="844"></iframe>
+<body>
 <script>
 (async () => {
-  const phone = document.getElementById('phone'), wide = [];
-  for (const name of NAMES) {
-    await new Promise((loaded) => { phone.onload = loaded; phone.src = SITE + name; });
-    const page = phone.contentDocument.documentElement;
-    if (page.scrollWidth > page.clientWidth) wide.push(`${name} is ${page.scrollWidth} pixels wide on a phone of ${page.clientWidth}`);
-  }
-  document.body.replaceChildren(Object.assign(document.createElement('pre'), { textContent: ['looked', ...wide].join('\\n') }));
+  const names = NAMES, wide = [];
+  const look = async () => {
+    const phone = document.body.appendChild(Object.assign(document.createElement('iframe'), { width: 390, height: 844 }));
+    while (names.length > 0) {
+      const name = names.pop();
+      await new Promise((loaded) => { phone.onload = loaded; phone.src = SITE + name; });
+      const page = phone.contentDocument.documentElement;
+      if (page.scrollWidth > page.clientWidth) wide.push(`${name} is ${page.scrollWidth} pixels wide on a phone of ${page.clientWidth}`);
+    }
+  };
+  await Promise.all(Array.from({ length: 4 }, look));
+  document.body.replaceChildren(Object.assign(document.createElement('pre'), { textContent: ['looked', ...wide.sort()].join('\\n') }));
 })();
 </script>
 """
@@ -370,20 +388,20 @@ def phone_faults(site):
     """One for each page that a phone would have to scroll sideways; those of lessons are looked at by tests/course."""
     browser = chromium()
     if browser is None:
-        return
+        return []
     names = sorted(path.name for path in site.glob("*.html") if not path.stem.endswith(("_source", "-members")))
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         phone = pathlib.Path(folder) / "phone.html"
         phone.write_text(PHONE.replace("NAMES", json.dumps(names)).replace("SITE", json.dumps(site.as_uri() + "/")), encoding="utf-8")
         seen = subprocess.run(
-            [browser, "--headless", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run", "--allow-file-access-from-files",
-             f"--virtual-time-budget={1000 * len(names)}", f"--user-data-dir={folder}/profile", "--dump-dom", phone.as_uri()],
+            [browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run",
+             "--allow-file-access-from-files", f"--virtual-time-budget={1000 * len(names)}", f"--user-data-dir={folder}/profile",
+             "--dump-dom", phone.as_uri()],
             capture_output=True, text=True, timeout=600).stdout
     found = re.search(r"<pre>looked\n?(.*?)</pre>", seen, flags=re.DOTALL)
     if not found:
-        yield "no page could be looked at as on a phone"
-        return
-    yield from html.unescape(found.group(1)).splitlines()
+        return ["no page could be looked at as on a phone"]
+    return html.unescape(found.group(1)).splitlines()
 
 
 # The figure of a lesson's page that stands for it; the first, where none is named.
@@ -408,14 +426,19 @@ def main():
     site, course = pathlib.Path(sys.argv[1]).resolve(), pathlib.Path(sys.argv[2]).resolve()
     shutil.rmtree(site, ignore_errors=True)
     site.mkdir(parents=True)
-    faults = run_doxygen(site)
-    tidied(site)
-    figures(site)
-    lessons(site, course)
-    find_page(site)
-    source_pages(site)
-    mended(site)
-    faults += [*readme_faults(), *link_faults(site), *phone_faults(site)]
+    # The browser is most of the time. It runs beside Doxygen and beside the look at links; two browsers at once took longer than in turn.
+    with concurrent.futures.ThreadPoolExecutor(1) as browsing:
+        pictures = lesson_pages(site, course, browsing)
+        faults = run_doxygen(site)
+        tidied(site)
+        figures(site)
+        gallery(site, course, pictures)
+        find_page(site)
+        source_pages(site)
+        mended(site)
+        on_a_phone = browsing.submit(phone_faults, site)
+        faults += [f"there is no picture of {name}" for name, taken in pictures.items() if not taken.result()]
+        faults += [*readme_faults(), *link_faults(site), *on_a_phone.result()]
     for fault in faults:
         print(f"docs: {fault}", file=sys.stderr)
     sys.exit(1 if faults else 0)
