@@ -2,10 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <filesystem>
 #include <initializer_list>
-#include <iterator>
 #include <numeric>
 #include <set>
 #include <string>
@@ -18,6 +16,7 @@
 #include <cairn/models/motion.hpp>
 
 #include "landmark_log.hpp"
+#include "wheel_errors.hpp"
 
 namespace fastslam {
 
@@ -72,13 +71,17 @@ std::vector<Row> read_rows(const std::filesystem::path& path, std::initializer_l
 struct Files {
   using enum Column;
   std::vector<std::string> notes;
-  std::vector<Row> odometry, sightings, truth;
+  std::vector<WheelSpeeds> odometry;
+  std::vector<CodeSighting> sightings;
+  std::vector<Row> truth;
   std::map<int, std::uint32_t> subject_of;  // by bar code
   std::map<std::uint32_t, Vector<2>> landmarks;
 
-  Files(const std::filesystem::path& folder, const std::string& robot)
-      : odometry(read_timed(folder / (robot + "_Odometry.dat"), {time, number, number})),
-        sightings(read_timed(folder / (robot + "_Measurement.dat"), {time, identity, distance, number})) {
+  Files(const std::filesystem::path& folder, const std::string& robot) {
+    for (const Row& r : read_timed(folder / (robot + "_Odometry.dat"), {time, number, number}))
+      odometry.push_back({r[0], r[1], r[2]});
+    for (const Row& r : read_timed(folder / (robot + "_Measurement.dat"), {time, identity, distance, number}))
+      sightings.push_back({r[0], static_cast<int>(r[1]), r[2], r[3]});
     const std::filesystem::path watched = folder / (robot + "_Groundtruth.dat");
     if (std::filesystem::exists(watched))
       truth = read_timed(watched, {time, number, number, number});
@@ -100,140 +103,6 @@ private:
   }
 };
 
-/// How odometry differs from what the robot does: turns on the spot err by another factor than curves.
-struct WheelErrors {
-  double delay = 0;                       ///< [s] that the robot moves later than odometry says so
-  double turn = 1, turn_on_the_spot = 1;  ///< what it turns where odometry says one
-
-  bool operator==(const WheelErrors&) const = default;
-};
-
-bool is_on_the_spot(const Row& odometry) {
-  constexpr double slowest = 0.01;  // [m/s]
-  return std::abs(odometry[1]) < slowest;
-}
-
-/// Metres gone, radians turned on the way and radians turned on the spot, by odometry until a time.
-class Gone {
-public:
-  explicit Gone(const std::vector<Row>& odometry) : odometry_(odometry) {
-    for (std::size_t i = 0; i + 1 < odometry.size(); ++i)
-      until_.emplace_back(until_.back() + (odometry[i + 1][0] - odometry[i][0]) * rates(odometry[i]));
-  }
-  [[nodiscard]] Vector<3> until(double time) const {
-    const auto after = std::ranges::upper_bound(odometry_, time, {}, [](const Row& r) { return r[0]; });
-    if (after == odometry_.begin()) return Vector<3>::Zero();
-    const auto i = static_cast<std::size_t>(after - odometry_.begin()) - 1;
-    if (after == odometry_.end()) return until_[i];
-    return until_[i] + (time - odometry_[i][0]) * rates(odometry_[i]);
-  }
-
-private:
-  static Vector<3> rates(const Row& r) {
-    return is_on_the_spot(r) ? Vector<3>(r[1], 0, r[2]) : Vector<3>(r[1], r[2], 0);
-  }
-
-  const std::vector<Row>& odometry_;
-  std::vector<Vector<3>> until_{Vector<3>::Zero()};
-};
-
-/// A bar code seen at two times.
-struct SeenTwice {
-  double from, to;
-  Vector<2> place;  // from the robot, at first
-  double bearing;   // then
-};
-
-/// Each sighting with the last one of the same code that is `least` to `most` seconds before it.
-std::vector<SeenTwice> seen_twice(const std::vector<Row>& sightings, double least, double most) {
-  std::vector<SeenTwice> pairs;
-  std::map<int, std::deque<const Row*>> sightings_of;  // not older than that
-  for (const Row& seen : sightings) {
-    std::deque<const Row*>& before = sightings_of[static_cast<int>(seen[1])];
-    while (!before.empty() && seen[0] - (*before.front())[0] > most) before.pop_front();
-    const auto too_late = std::ranges::partition_point(
-        before, [&](const Row* row) { return seen[0] > (*row)[0] && seen[0] - (*row)[0] >= least; });
-    if (too_late != before.begin()) {
-      const Row& first = **std::prev(too_late);
-      const Vector<2> place = first[2] * Vector<2>(std::cos(first[3]), std::sin(first[3]));
-      pairs.push_back({first[0], seen[0], place, seen[3]});
-    }
-    before.push_back(&seen);
-  }
-  return pairs;
-}
-
-/// What odometry says of the robot between the two sightings.
-Vector<3> gone_between(const SeenTwice& pair, const Gone& gone, double delay) {
-  return gone.until(pair.to - delay) - gone.until(pair.from - delay);
-}
-
-/// How far the bearings of codes that were seen twice are from where wheels with these errors would have
-/// turned them [rad]: the sum, which a code that is read wrongly does not pull at.
-double sum_of_errors(const std::vector<SeenTwice>& pairs, const Gone& gone, const WheelErrors& wheels) {
-  double sum = 0;
-  for (const SeenTwice& p : pairs) {
-    const Vector<3> moved = gone_between(p, gone, wheels.delay);
-    const double turned = wheels.turn * moved(1) + wheels.turn_on_the_spot * moved(2);
-    const Vector<2> then = SE2::exp(Vector<3>(moved(0), 0, turned)).inverse() * p.place;
-    sum += std::abs(cairn::SO2(p.bearing - std::atan2(then(1), then(0))).angle());
-  }
-  return sum;
-}
-
-/// By the codes that the robot sees twice: the delay to a hundredth of a second and the turns to a
-/// thousandth, each by the least sum of errors with the others as they are, until all stay. Sightings that
-/// follow one another tell the delay; of the turns they have too little, and the jitter of their times makes
-/// these look smaller than they are: over a second it does not. Where too little was seen of one, odometry is
-/// believed.
-WheelErrors wheel_errors(const Files& files) {
-  constexpr std::size_t enough = 100, enough_turned = 30;
-  constexpr double turned = 0.1;  // [rad]
-  constexpr int most_rounds = 10;
-  const std::vector<SeenTwice> soon = seen_twice(files.sightings, 0, 1);
-  const std::vector<SeenTwice> later = seen_twice(files.sightings, 1, 2);
-  const Gone gone(files.odometry);
-  // The best of middle + i step, |i| <= reach; of two as good the one nearer to the middle.
-  const auto best = [&](const auto& pairs, const auto& with, int middle, int step, int reach) {
-    int found = middle;
-    double least = sum_of_errors(pairs, gone, with(middle));
-    for (int i = 1; i <= reach; ++i)
-      for (const int value : {middle + i * step, middle - i * step})
-        if (const double sum = sum_of_errors(pairs, gone, with(value)); sum < least) {
-          least = sum;
-          found = value;
-        }
-    return found;
-  };
-  const auto has_turned = [&](int kind, double delay) {
-    const auto has = [&](const SeenTwice& p) {
-      return std::abs(gone_between(p, gone, delay)(kind)) > turned;
-    };
-    return static_cast<std::size_t>(std::ranges::count_if(later, has)) >= enough_turned;
-  };
-  WheelErrors now;
-  for (int round = 0; round < most_rounds; ++round) {
-    const WheelErrors before = now;
-    const auto set = [&](double WheelErrors::* which, double to) {
-      WheelErrors wheels = now;
-      wheels.*which = to;
-      return wheels;
-    };
-    if (soon.size() >= enough) {
-      const auto delayed = [&](int hundredths) { return set(&WheelErrors::delay, hundredths / 100.0); };
-      now = delayed(best(soon, delayed, 0, 1, 50));
-    }
-    int kind = 1;
-    for (const auto which : {&WheelErrors::turn, &WheelErrors::turn_on_the_spot}) {
-      if (!has_turned(kind++, now.delay)) continue;
-      const auto turning = [&](int thousandths) { return set(which, thousandths / 1000.0); };
-      now = turning(best(later, turning, best(later, turning, 1000, 20, 30), 1, 20));
-    }
-    if (now == before) break;
-  }
-  return now;
-}
-
 /// Odometry turned into motions between frames.
 class Wheels {
 public:
@@ -249,10 +118,10 @@ public:
       cairn::raise(file_.string() + ": the motion until " + cairn::shortest(to) + " s: " + explain(status));
     time_ = to;
   }
-  void steer(const Row& odometry) {
-    control_ = Vector<2>(odometry[1], odometry[2]);
+  void steer(const WheelSpeeds& odometry) {
+    control_ = Vector<2>(odometry.speed, odometry.turn);
     process_.turn_density =
-        turn_density + (is_on_the_spot(odometry) ? on_the_spot * std::abs(odometry[2]) : 0);
+        turn_density + (is_on_the_spot(odometry) ? on_the_spot * std::abs(odometry.turn) : 0);
   }
   void between() {
     if (!log_.frames.empty()) log_.between.push_back({time_, log_.frames.size() - 1, moved_.mean});
@@ -287,10 +156,10 @@ LandmarkLog read_mrclam(const std::filesystem::path& folder, int robot) {
   Files files(folder, name);
   if (files.odometry.empty())
     cairn::raise((folder / name).string() + "_Odometry.dat: expected odometry, found none");
-  const WheelErrors wheel = wheel_errors(files);
-  for (Row& r : files.odometry) {
-    r[0] += wheel.delay;
-    r[2] *= is_on_the_spot(r) ? wheel.turn_on_the_spot : wheel.turn;
+  const WheelErrors wheel = wheel_errors(files.odometry, files.sightings);
+  for (WheelSpeeds& now : files.odometry) {
+    now.time += wheel.delay;
+    now.turn *= is_on_the_spot(now) ? wheel.turn_on_the_spot : wheel.turn;
   }
   LandmarkLog log{
       .name = "UTIAS " + folder.filename().string() + ", robot " + std::to_string(robot),
@@ -301,27 +170,27 @@ LandmarkLog read_mrclam(const std::filesystem::path& folder, int robot) {
   };
   for (const Row& r : files.truth) log.truth.push_back({r[0], {r[1], r[2], r[3]}});
   for (const auto& [time, pose] : log.truth)  // where it was when odometry began
-    if (!log.start || time <= files.odometry.front()[0]) log.start = pose;
+    if (!log.start || time <= files.odometry.front().time) log.start = pose;
   std::set<int> unknown;
-  const double begin = files.odometry.front()[0];
+  const double begin = files.odometry.front().time;
   Wheels wheels(log, folder / (name + "_Odometry.dat"), begin);
   std::size_t next = 0;
-  while (next < files.sightings.size() && files.sightings[next][0] <= begin) ++next;
+  while (next < files.sightings.size() && files.sightings[next].time <= begin) ++next;
   std::size_t outside = next;
-  for (const Row& o : files.odometry) {
-    for (; next < files.sightings.size() && files.sightings[next][0] <= o[0]; ++next) {
-      const Row& seen = files.sightings[next];
-      const auto subject = files.subject_of.find(static_cast<int>(seen[1]));
-      if (subject == files.subject_of.end()) unknown.insert(static_cast<int>(seen[1]));
+  for (const WheelSpeeds& now : files.odometry) {
+    for (; next < files.sightings.size() && files.sightings[next].time <= now.time; ++next) {
+      const CodeSighting& seen = files.sightings[next];
+      const auto subject = files.subject_of.find(seen.code);
+      if (subject == files.subject_of.end()) unknown.insert(seen.code);
       if (subject == files.subject_of.end() || !files.landmarks.contains(subject->second)) continue;
-      wheels.move(seen[0]);
+      wheels.move(seen.time);
       const bool same = !log.frames.empty() && log.frames.back().time == wheels.time();
       Frame& frame = same ? log.frames.back() : wheels.frame();
-      frame.seen.push_back({cairn::RangeBearing::measurement(seen[2], seen[3]), subject->second});
+      frame.seen.push_back({cairn::RangeBearing::measurement(seen.range, seen.bearing), subject->second});
     }
-    wheels.move(o[0]);
+    wheels.move(now.time);
     wheels.between();
-    wheels.steer(o);
+    wheels.steer(now);
   }
   outside += files.sightings.size() - next;
   if (log.frames.empty())
