@@ -244,13 +244,15 @@ def chromium():
     return None
 
 
+# Software draws, 3-D figures too: the same picture everywhere, and no second process for a GPU that is not there.
+HEADLESS = ("--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--no-first-run")
+
+
 def screenshot(browser, page_file, query, target, width, height):
     with tempfile.TemporaryDirectory(prefix="cairn-docs-", ignore_cleanup_errors=True) as profile:
         done = subprocess.run(
-            [browser, "--headless", "--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage",
-             "--no-first-run", "--hide-scrollbars", "--virtual-time-budget=4000", f"--user-data-dir={profile}",
-             f"--window-size={width},{height}", f"--screenshot={target}",
-             page_file.resolve().as_uri() + query],
+            [browser, *HEADLESS, "--hide-scrollbars", "--virtual-time-budget=4000", f"--user-data-dir={profile}",
+             f"--window-size={width},{height}", f"--screenshot={target}", page_file.resolve().as_uri() + query],
             stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=300)
     return done.returncode == 0 and target.is_file()
 
@@ -394,9 +396,8 @@ def phone_faults(site):
         phone = pathlib.Path(folder) / "phone.html"
         phone.write_text(PHONE.replace("NAMES", json.dumps(names)).replace("SITE", json.dumps(site.as_uri() + "/")), encoding="utf-8")
         seen = subprocess.run(
-            [browser, "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage", "--no-first-run",
-             "--allow-file-access-from-files", f"--virtual-time-budget={1000 * len(names)}", f"--user-data-dir={folder}/profile",
-             "--dump-dom", phone.as_uri()],
+            [browser, *HEADLESS, "--allow-file-access-from-files", f"--virtual-time-budget={1000 * len(names)}",
+             f"--user-data-dir={folder}/profile", "--dump-dom", phone.as_uri()],
             capture_output=True, text=True, timeout=600).stdout
     found = re.search(r"<pre>looked\n?(.*?)</pre>", seen, flags=re.DOTALL)
     if not found:

@@ -38,7 +38,7 @@ struct WheelErrors {
 };
 
 /// By the codes that the robot sees twice: the delay to a hundredth of a second within 0.5 s and the turns to
-/// a thousandth from 0.4 to 1.6, each by the least sum of errors in bearing with the others as they are,
+/// a thousandth from 0.38 to 1.62, each by the least sum of errors in bearing with the others as they are,
 /// until all stay. Sightings that follow one another tell the delay; of the turns they have too little, and
 /// the jitter of their times makes these look smaller than they are: over a second it does not. Where too
 /// little was seen of one, odometry is believed. Both lists are by time, all numbers finite. A few hundred
