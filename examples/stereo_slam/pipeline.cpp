@@ -245,8 +245,8 @@ void Pipeline::choose_calibration() {
 
 /// A rig that was as its file says and no longer is has come loose. One frame can be wrong.
 void Pipeline::watch_rig() {
-  constexpr int every = 5, beyond_chance = 3;
-  if (options_.calibrate != Calibration::automatic || corrects_rig() || step_ % every != 0) return;
+  constexpr int beyond_chance = 5;
+  if (options_.calibrate != Calibration::automatic || corrects_rig()) return;
   const VerticalDisparity seen = disparity_of_locals();
   shown_off_ = seen.shows() ? shown_off_ + 1 : 0;
   if (shown_off_ < beyond_chance) return;
@@ -707,8 +707,8 @@ void Pipeline::calibrate(const Located& located) {
     const cairn::Vector<2> right = one.right - locals_[located.agreed[i].local].moved;
     seen.push_back({one.landmark, one.left, right, one.sigma});
   }
-  if (!calibration_.observe(T_world_camera_, std::move(seen))) return;
-  loose_ = calibration_.rig();
+  calibration_.observe(step_, T_world_camera_, std::move(seen));
+  loose_ = calibration_.next().corrected();
   find_pairs_by(*loose_);
 }
 
@@ -817,7 +817,7 @@ std::vector<cairn::SE3> Pipeline::corrected_path() const {
 RunRecord Pipeline::record() {
   RunRecord record = record_;
   record.variance_factor = noise_factors_.poses();
-  record.rig = loose_.value_or(rig_);
+  record.rig = rig_;
   record.corrected = corrected_path();
   if (const auto rig = map_.rig_correction()) {
     record.calibration.numbers = rig->mean;
@@ -825,8 +825,10 @@ RunRecord Pipeline::record() {
     for (int i = 0; i < cairn::rig_numbers; ++i)  // what is held to be known was not estimated
       record.calibration.sigmas(i) = before(i) > 0 ? std::sqrt(rig->covariance(i, i)) : 0;
   } else if (loose_) {
-    record.calibration.numbers.head<5>() = calibration_.drift().state();
-    record.calibration.sigmas.head<5>() = calibration_.drift().covariance().diagonal().cwiseSqrt();
+    const cairn::CalibrationDrift known = calibration_.now();
+    record.rig = known.corrected();
+    record.calibration.numbers.head<5>() = known.state();
+    record.calibration.sigmas.head<5>() = known.covariance().diagonal().cwiseSqrt();
   }
   record.landmarks.reserve(landmarks_.size());
   for (const Landmark& landmark : landmarks_.all())

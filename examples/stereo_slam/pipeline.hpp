@@ -74,11 +74,11 @@ struct PipelineOptions {
   /// principal points are left as they are given: freed, they take up what lenses do besides
   /// (docs/stereo_slam.md).
   cairn::RigSigmas rig = {.rotation = 5e-4, .direction = 5e-4, .length = 3e-3};
-  /// How a rig that is followed may be off at first, and move. With a walk of a third the largest error on
-  /// the arena's drifting rig was 1.7 times as large, and with a fifth of the sigma a knock of 2 mrad was
-  /// found to be one of 0.6.
+  /// How a rig that is followed may be off at first, and move. Without a rate the largest error on the
+  /// arena's drifting rig was 2.4 times as large, and with a fifth of the sigma a knock of 2 mrad was found
+  /// to be one of 0.6.
   cairn::CalibrationDriftOptions calibration = {
-      .initial_sigma = 1e-3, .walk_rotation = 3e-5, .walk_baseline = 1e-6};
+      .initial_sigma = 1e-3, .walk_rotation = 1e-5, .walk_baseline = 1e-6, .rate_sigma = 5e-6};
 
   double pixel_sigma = 0.35;     ///< noise of the coordinates of a point of scale 1 [pixels]
   double scale_exponent = 0.65;  ///< it grows with this power of the scale

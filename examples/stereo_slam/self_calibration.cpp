@@ -28,19 +28,22 @@ std::vector<cairn::MovedPair> seen_in_both(const std::vector<Sighting>& before,
 
 }  // namespace
 
-bool SelfCalibration::observe(const cairn::SE3& T_world_camera, std::vector<Sighting> sightings) {
+bool SelfCalibration::observe(int frame, const cairn::SE3& T_world_camera, std::vector<Sighting> sightings) {
   std::ranges::sort(sightings, {}, &Sighting::landmark);
-  ++frames_;
+  now_ = frame;
+  const int frames = now_ - begun_;
   const std::vector<cairn::MovedPair> pairs = seen_in_both(before_, sightings);
-  if (2 * pairs.size() > before_.size() && frames_ < longest_motion) return false;
+  if (2 * pairs.size() > before_.size() && frames < longest_motion) return false;
   bool corrected = false;
   if (pairs.size() >= enough_points) {
     const cairn::SE3 motion = T_world_before_.inverse() * T_world_camera;
-    corrected = drift_.update_moved(pairs, motion, frames_).good();
+    corrected = drift_.update_moved(pairs, motion, frames).good();
+  } else if (!before_.empty()) {
+    drift_ = drift_.ahead(frames);  // unseen, it goes on turning
   }
   before_ = std::move(sightings);
   T_world_before_ = T_world_camera;
-  frames_ = 0;
+  begun_ = now_;
   return corrected;
 }
 

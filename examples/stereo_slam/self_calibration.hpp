@@ -30,17 +30,19 @@ public:
   SelfCalibration(const cairn::StereoRig& nominal, const cairn::CalibrationDriftOptions& options)
       : drift_(nominal, options) {}
 
-  /// The landmarks seen from a pose, one of each at most. True where the correction changed.
-  bool observe(const cairn::SE3& T_world_camera, std::vector<Sighting> sightings);
+  /// The landmarks seen from a pose, one of each at most, in frames whose numbers rise. True where the
+  /// correction changed.
+  bool observe(int frame, const cairn::SE3& T_world_camera, std::vector<Sighting> sightings);
 
-  [[nodiscard]] cairn::StereoRig rig() const { return drift_.corrected(); }
-  [[nodiscard]] const cairn::CalibrationDrift& drift() const noexcept { return drift_; }
+  /// What is known of the rig by the last frame, and of what it will be in the next one.
+  [[nodiscard]] cairn::CalibrationDrift now() const { return drift_.ahead(now_ - begun_); }
+  [[nodiscard]] cairn::CalibrationDrift next() const { return drift_.ahead(now_ - begun_ + 1); }
 
 private:
   cairn::CalibrationDrift drift_;
   std::vector<Sighting> before_;  // at the beginning of the motion, by landmark
   cairn::SE3 T_world_before_;
-  int frames_ = 0;  // since then
+  int begun_ = 0, now_ = 0;  // frames: that one, and the last one
 };
 
 }  // namespace stereo_slam

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include <algorithm>
 #include <cmath>
+#include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -14,12 +15,14 @@
 #include "support/elimination.hpp"
 #include "support/random.hpp"
 #include "support/rigs.hpp"
+#include "support/violation.hpp"
 
 namespace calibration_drift_test {
 namespace {
 
 using cairn::CalibrationDrift;
 using cairn::CalibrationHealth;
+using cairn::Matrix;
 using cairn::PixelPair;
 using cairn::SE3;
 using cairn::SO3;
@@ -137,6 +140,64 @@ TEST_SUITE("calibration_drift") {
       if (k > 10) worst = std::max(worst, std::abs(rotation_error(drift.corrected(), truth)(0)));
     }
     CHECK(worst < 2.5e-4);  // a quarter of a pixel; the drift is four pixels
+  }
+
+  TEST_CASE("CalibrationDrift: between measurements it spreads as a rig does that turns, forgets and walks") {
+    constexpr cairn::CalibrationDriftOptions options{.initial_sigma = 2e-3,
+                                                     .walk_rotation = 3e-4,
+                                                     .walk_baseline = 1e-4,
+                                                     .rate_sigma = 1e-4,
+                                                     .rate_memory = 20};
+    const CalibrationDrift start(cairn_test::rectified_rig(), options);
+    for (const int frames : {1, 7, 20, 300}) {
+      CAPTURE(frames);
+      // The variances' differential equations, in small steps: w' = rate + noise, rate' = -rate/memory +
+      // noise.
+      const double noise = 2 * options.rate_sigma * options.rate_sigma / options.rate_memory;
+      double ww = options.initial_sigma * options.initial_sigma, wr = 0,
+             rr = options.rate_sigma * options.rate_sigma, tt = ww;
+      constexpr int steps = 20000;  // a frame
+      constexpr double dt = 1.0 / steps;
+      for (int k = 0; k < frames * steps; ++k) {
+        ww += dt * (2 * wr + options.walk_rotation * options.walk_rotation);
+        wr += dt * (rr - wr / options.rate_memory);
+        rr += dt * (noise - 2 * rr / options.rate_memory);
+        tt += dt * options.walk_baseline * options.walk_baseline;
+      }
+      const CalibrationDrift then = start.ahead(frames);
+      for (int i = 0; i < 3; ++i) {
+        CHECK(then.covariance()(i, i) == doctest::Approx(ww).epsilon(1e-4));
+        CHECK(then.rate_covariance()(i, i) == doctest::Approx(rr).epsilon(1e-4));
+      }
+      CHECK(then.covariance()(4, 4) == doctest::Approx(tt).epsilon(1e-4));
+      CHECK(then.covariance()(0, 1) == 0.0);
+      // In one go or frame by frame: w, its rate, and, by what comes next, both together.
+      CalibrationDrift stepped = start;
+      for (int k = 0; k < frames; ++k) stepped = stepped.ahead(1);
+      const Matrix<5> whole = then.ahead(5).covariance(), sum = stepped.ahead(5).covariance();
+      CHECK((whole - sum).cwiseAbs().maxCoeff() < 1e-9 * whole.cwiseAbs().maxCoeff());
+    }
+    CHECK(start.ahead(0).covariance() == start.covariance());
+    CHECK(cairn_test::violation_of([&] { (void)start.ahead(-1); }) == "CalibrationDrift: cannot go back");
+    const CalibrationDrift off(cairn_test::rectified_rig(), {.enabled = false});
+    CHECK(off.ahead(9).covariance() == off.covariance());
+  }
+
+  TEST_CASE("CalibrationDrift: refuses options that are none") {
+    const StereoRig rig = cairn_test::rectified_rig();
+    using Options = cairn::CalibrationDriftOptions;
+    for (double Options::* const number :
+         {&Options::initial_sigma, &Options::walk_rotation, &Options::walk_baseline, &Options::rate_sigma,
+          &Options::rate_memory, &Options::pixel_sigma})
+      for (const double bad : {-1.0, static_cast<double>(NAN), static_cast<double>(INFINITY)}) {
+        Options options;
+        options.*number = bad;
+        CHECK(cairn_test::violation_of([&] { CalibrationDrift(rig, options); }).find("expected") !=
+              std::string::npos);
+      }
+    CHECK_FALSE(cairn_test::violation_of([&] { CalibrationDrift(rig, {.rate_memory = 0}); }).empty());
+    CHECK_FALSE(cairn_test::violation_of([&] { CalibrationDrift(rig, {.initial_sigma = 0}); }).empty());
+    CHECK(cairn_test::violation_of([&] { CalibrationDrift(rig, {.walk_baseline = 0}); }).empty());
   }
 
   TEST_CASE("CalibrationDrift: frames without pairs or with impossible pixels are harmless") {

@@ -3,11 +3,19 @@
 //
 /// @file
 /// Keeps a stereo rig calibrated while it is used: a Kalman filter on the five numbers that epipolar
-/// residuals can see.
+/// residuals can see, and on how fast three of them change.
 ///
-/// State: that of rig_correction.hpp, R = R0 exp(w) and the direction of the baseline t.
-/// Random walk; each match is one scalar measurement, the epipolar constraint e = a . (t x R b) = 0 divided
-/// by its standard deviation, with
+/// State: that of rig_correction.hpp, R = R0 exp(w) and the direction of the baseline t, which walk at
+/// random; and the rate r at which w goes on turning where a camera works itself loose, an Ornstein-Uhlenbeck
+/// process: at any time as large as its sigma says, and forgotten over its memory of so many frames. Over f
+/// frames, with a = f / memory,
+///   w += memory (1 - exp(-a)) r,   r *= exp(-a),   with noise of the covariance sigma^2 times
+///   ww: memory^2 (2 a - 3 + 4 exp(-a) - exp(-2 a)),   wr: memory (1 - exp(-a))^2,   rr: 1 - exp(-2 a)  (2)
+/// (G. E. Uhlenbeck, L. S. Ornstein, "On the theory of the Brownian motion", Physical Review 36, 1930). With
+/// no rate a rig that turns steadily is followed with a lag, which a motion lays on the baseline.
+///
+/// Each match is one scalar measurement, the epipolar constraint e = a . (t x R b) = 0 divided by its
+/// standard deviation, with
 ///   d e / d w = b x R^T (a x t),   d e / d t = R b x a                                   (1)
 /// Vertical disparity sees w_x and w_z well, w_y only through x y and through the spread of depth: its
 /// variance says so, and it is the one that ruins depth (d z = z^2 w_y / b). Motion sees it: update_moved().
@@ -42,8 +50,12 @@ struct CalibrationDriftOptions {
   double initial_sigma = 1e-3;  ///< of each of the five numbers [rad]
   double walk_rotation = 3e-5;  ///< random walk of the rotation [rad / sqrt(frame)]
   double walk_baseline = 1e-5;  ///< of the baseline's direction [rad / sqrt(frame)]
-  double pixel_sigma = 0.5;     ///< noise of a coordinate [pixels]
-  double gate = 3.5;            ///< matches whose innovation exceeds this many deviations are left out
+  /// Of how fast the rotation goes on turning, about each axis [rad / frame]. 0: it only walks. With a rate
+  /// use update_moved(), which alone sees the one about y: else the yaw is soon not known at all.
+  double rate_sigma = 0;
+  double rate_memory = 500;  ///< frames over which a rate is forgotten
+  double pixel_sigma = 0.5;  ///< noise of a coordinate [pixels]
+  double gate = 3.5;         ///< matches whose innovation exceeds this many deviations are left out
   double unhealthy_distance =
       1.5;  ///< typical epipolar distance at which depth is not to be trusted [pixels]
 };
@@ -56,21 +68,40 @@ struct CalibrationHealth {
   bool healthy = true;  ///< distance_after below unhealthy_distance
 };
 
-/// The filter. Needs a rig with a baseline.
+/// The filter. Needs a rig with a baseline and options that are finite and not negative, with positive
+/// initial_sigma, pixel_sigma and rate_memory.
 class CalibrationDrift {
 public:
   explicit CalibrationDrift(const StereoRig& nominal, const CalibrationDriftOptions& options = {})
-      : correction_(nominal), options_(options), state_(Vector<5>::Zero()) {
-    covariance_ = Matrix<5>::Identity() * (options.initial_sigma * options.initial_sigma);
+      : correction_(nominal), options_(options), state_(State::Zero()) {
+    for (const double least_zero : {options.walk_rotation, options.walk_baseline, options.rate_sigma})
+      CAIRN_EXPECTS(std::isfinite(least_zero) && least_zero >= 0,
+                    "CalibrationDrift: expected walks and a rate's sigma that are finite and not negative");
+    for (const double positive : {options.initial_sigma, options.pixel_sigma, options.rate_memory})
+      CAIRN_EXPECTS(std::isfinite(positive) && positive > 0,
+                    "CalibrationDrift: expected positive sigmas and a memory of some frames");
+    covariance_ = initial(options.initial_sigma);
   }
 
   /// The rig with the correction so far.
   [[nodiscard]] StereoRig corrected() const {
-    return options_.enabled ? correction_.rig(state_) : correction_.nominal();
+    return options_.enabled ? correction_.rig(state()) : correction_.nominal();
   }
 
-  [[nodiscard]] const Vector<5>& state() const noexcept { return state_; }
-  [[nodiscard]] const Matrix<5>& covariance() const noexcept { return covariance_; }
+  /// The filter in `frames` frames in which it sees nothing.
+  [[nodiscard]] CalibrationDrift ahead(int frames) const {
+    CAIRN_EXPECTS(frames >= 0, "CalibrationDrift: cannot go back");
+    CalibrationDrift then = *this;
+    if (options_.enabled) then.walk(frames);
+    return then;
+  }
+
+  /// The correction, see RigCorrection.
+  [[nodiscard]] Vector<5> state() const { return part_of<5, 1>(state_, 0, 0); }
+  [[nodiscard]] Matrix<5> covariance() const { return part_of<5, 5>(covariance_, 0, 0); }
+  /// How fast the rotation changes [rad / frame].
+  [[nodiscard]] Vector<3> rate() const { return part_of<3, 1>(state_, 5, 0); }
+  [[nodiscard]] Matrix<3> rate_covariance() const { return part_of<3, 3>(covariance_, 5, 5); }
 
   /// Takes the pairs of one frame. Pairs without rays are ignored. O(pairs).
   CalibrationHealth update(std::span<const PixelPair> pairs) {
@@ -94,15 +125,20 @@ public:
   MotionCalibration update_moved(std::span<const MovedPair> pairs, const SE3& guess, int frames = 1,
                                  const MotionCalibrationOptions& options = {}) {
     CAIRN_EXPECTS(frames > 0, "CalibrationDrift: expected a motion of at least one frame");
-    if (!options_.enabled) return {state_, covariance_, guess};
+    if (!options_.enabled) return {state(), covariance(), guess};
     walk(frames);
-    MotionCalibration result = calibrate_from_motion(correction_, state_, covariance_, pairs, guess, options);
+    const auto result = detail::calibrate_from_motion<numbers>(correction_, state_, covariance_, pairs,
+                                                               frames, guess, options);
     state_ = result.state;
     covariance_ = result.covariance;
-    return result;
+    return {state(), covariance(), result.T_before_after, result.inliers, result.status};
   }
 
 private:
+  static constexpr int numbers = 8;  // the correction, then how fast w changes
+  using State = Vector<numbers>;
+  using Covariance = Matrix<numbers>;
+
   struct Rays {
     Vector<2> left, right;  // normalised coordinates
   };
@@ -110,7 +146,7 @@ private:
   struct Innovation {
     double value;     // epipolar residual over its standard deviation
     double variance;  // 1 + H P H^T
-    Vector<5> H, PHt;
+    State H, PHt;
   };
 
   [[nodiscard]] std::vector<Rays> normalise(std::span<const PixelPair> pairs) const {
@@ -124,16 +160,53 @@ private:
     return rays;
   }
 
+  /// Of a correction that nothing has been seen of.
+  [[nodiscard]] Covariance initial(double sigma) const {
+    Covariance result = Covariance::Identity() * (sigma * sigma);
+    for (int i = 5; i < numbers; ++i) result(i, i) = rate_variance();
+    return result;
+  }
+
+  /// A rate that is known keeps the covariance positive definite.
+  [[nodiscard]] double rate_variance() const noexcept {
+    constexpr double least = 1e-12;
+    return squared(std::max(options_.rate_sigma, least));
+  }
+
+  /// The rotation goes on at its rate, which is forgotten by and by (2), and walks besides.
   void walk(int frames) {
-    const double rotation = options_.walk_rotation * options_.walk_rotation,
-                 baseline = options_.walk_baseline * options_.walk_baseline;
-    for (int i = 0; i < 5; ++i) covariance_(i, i) += frames * (i < 3 ? rotation : baseline);
+    const double t = frames, memory = options_.rate_memory, a = t / memory, kept = std::exp(-a);
+    const double integral = -memory * std::expm1(-a);  // of what is kept of a rate, over the frames
+    Covariance F = Covariance::Identity();
+    for (int i = 0; i < 3; ++i) {
+      F(i, 5 + i) = integral;
+      F(5 + i, 5 + i) = kept;
+    }
+    state_ = product(F, state_);
+    covariance_ = product_transposed(product(F, covariance_), F);
+    const double rotation = squared(options_.walk_rotation), baseline = squared(options_.walk_baseline),
+                 rate = rate_variance();
+    for (int i = 0; i < 5; ++i) covariance_(i, i) += t * (i < 3 ? rotation : baseline);
+    const double cross = rate * integral * integral / memory;
+    for (int i = 0; i < 3; ++i) {
+      covariance_(i, i) += rate * memory * memory * spread(a);
+      covariance_(i, 5 + i) += cross;
+      covariance_(5 + i, i) += cross;
+      covariance_(5 + i, 5 + i) += -rate * std::expm1(-2 * a);
+    }
+    covariance_ = symmetrised(covariance_);
+  }
+
+  /// 2 a - 3 + 4 exp(-a) - exp(-2 a), which is two thirds of a^3 where a is small.
+  [[nodiscard]] static double spread(double a) noexcept {
+    const double e = std::expm1(-a);
+    return a < 1e-2 ? a * a * a * (2.0 / 3 - a / 2) : 2 * (a + e) - e * e;
   }
 
   [[nodiscard]] Innovation innovation(const Rays& pair) const {
     const Vector<3> a(pair.left(0), pair.left(1), 1), b(pair.right(0), pair.right(1), 1),
-        t = correction_.direction(state_);
-    const Matrix<3> R = correction_.rotation(state_).matrix();
+        t = correction_.direction(state());
+    const Matrix<3> R = correction_.rotation(state()).matrix();
     const Vector<3> m = detail::cross<double>(a, t), Rb = product(R, b);
     const Vector<3> left_line = detail::cross<double>(t, Rb), right_line = transposed_product(R, m);
     const PinholeCamera &left = correction_.nominal().left, &right = correction_.nominal().right;
@@ -146,7 +219,7 @@ private:
         transposed_product(correction_.direction_jacobian(), detail::cross<double>(Rb, a));
     Innovation result;
     result.value = -a.dot(left_line) / std::max(sigma, 1e-12);
-    result.H << by_rotation(0), by_rotation(1), by_rotation(2), by_direction(0), by_direction(1);
+    result.H << by_rotation(0), by_rotation(1), by_rotation(2), by_direction(0), by_direction(1), 0, 0, 0;
     result.H /= std::max(sigma, 1e-12);
     result.PHt = product(covariance_, result.H);
     result.variance = 1 + result.H.dot(result.PHt);
@@ -177,21 +250,22 @@ private:
   void start_again(const std::vector<Rays>& rays) {
     const double focal = 0.5 * (correction_.nominal().left.fy() + correction_.nominal().right.fy());
     const double sigma = std::max(options_.initial_sigma, 2 * typical_distance(rays) / focal);
-    covariance_ = Matrix<5>::Identity() * (sigma * sigma);
-    const Vector<5> before = state_;
+    covariance_ = initial(sigma);
+    state_.tail<3>().setZero();
+    const State before = state_;
     std::vector<double> sizes(rays.size());
     for (int step = 0; step < 10; ++step) {
       for (std::size_t i = 0; i < rays.size(); ++i) sizes[i] = std::abs(innovation(rays[i]).value);
       const double scale = std::max(1.0, 1.4826 * median(sizes));
-      Matrix<5> information = Matrix<5>::Identity() / (sigma * sigma);
-      Vector<5> gradient = (before - state_) / (sigma * sigma);
+      Covariance information = Covariance::Identity() / (sigma * sigma);
+      State gradient = (before - state_) / (sigma * sigma);
       for (const Rays& pair : rays) {
         const Innovation z = innovation(pair);
         const double weight = 1 / (1 + squared(z.value / scale));
         information += weight * product_transposed(z.H, z.H);
         gradient += (weight * z.value) * z.H;
       }
-      state_ += Cholesky<5>(information).solve(gradient);
+      state_ += Cholesky<numbers>(information).solve(gradient);
     }
   }
 
@@ -208,8 +282,8 @@ private:
 
   RigCorrection correction_;
   CalibrationDriftOptions options_;
-  Vector<5> state_;
-  Matrix<5> covariance_;
+  State state_;
+  Covariance covariance_;
 };
 
 }}  // namespace cairn::CAIRN_ABI

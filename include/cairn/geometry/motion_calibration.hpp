@@ -73,27 +73,34 @@ enum class MotionCalibrationStatus {
   return "unknown status";
 }
 
-/// Result. Unless good, state and covariance are those given and the motion is the guess.
-struct MotionCalibration {
-  Vector<5> state;          ///< of the correction, see RigCorrection
-  Matrix<5> covariance;     ///< its posterior
-  SE3 T_before_after;       ///< pose of the left camera after the motion in its frame before
-  std::size_t inliers = 0;  ///< points inside the gate
+/// Result for a correction, or for one and how fast it changes (CalibrationDrift). Unless good, state and
+/// covariance are those given and the motion is the guess.
+template <int Numbers>
+struct MotionCalibrationOf {
+  Vector<Numbers> state;       ///< of the correction, see RigCorrection
+  Matrix<Numbers> covariance;  ///< its posterior
+  SE3 T_before_after;          ///< pose of the left camera after the motion in its frame before
+  std::size_t inliers = 0;     ///< points inside the gate
   MotionCalibrationStatus status = MotionCalibrationStatus::too_few_points;
   [[nodiscard]] bool good() const noexcept { return status == MotionCalibrationStatus::good; }
 };
+using MotionCalibration = MotionCalibrationOf<5>;
 
 namespace detail {
 
-/// The least-squares problem (1) at its current estimate.
+/// The least-squares problem (1) at its current estimate, of a rig that stays as it is (5 numbers) or whose
+/// right camera keeps turning (8): the correction after the motion, then how fast w changes a frame, so that
+/// before the motion it was w - rate * frames.
+template <int Numbers>
 class MotionCalibrationProblem {
 public:
-  static constexpr int shared = 11;  // motion, then correction
+  static_assert(Numbers == 5 || Numbers == 8, "MotionCalibrationProblem: a correction, or one and its rate");
+  static constexpr int shared = 6 + Numbers;  // motion, then correction, then rate
 
-  MotionCalibrationProblem(const RigCorrection& rig, const Vector<5>& state, const SE3& motion,
-                           std::span<const MovedPair> pairs)
-      : rig_(rig), state_(state), motion_(motion) {
-    const StereoRig start = rig.rig(state);
+  MotionCalibrationProblem(const RigCorrection& rig, const Vector<Numbers>& state, const SE3& motion,
+                           std::span<const MovedPair> pairs, double frames)
+      : rig_(rig), state_(state), motion_(motion), frames_(frames) {
+    const StereoRig start = rig.rig(correction_before());
     const Triangulator triangulate(start, {.max_gap = std::numeric_limits<double>::infinity()});
     for (const MovedPair& pair : pairs) {
       if (!(pair.sigma > 0 && std::isfinite(pair.sigma))) continue;
@@ -114,13 +121,13 @@ public:
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return tracks_.size(); }
-  [[nodiscard]] const Vector<5>& state() const noexcept { return state_; }
+  [[nodiscard]] const Vector<Numbers>& state() const noexcept { return state_; }
   [[nodiscard]] const SE3& motion() const noexcept { return motion_; }
 
   /// One step on the points inside `gate` with Cauchy weights of this scale. Its squared length in standard
   /// deviations, or nothing where the equations are degenerate.
-  [[nodiscard]] std::optional<double> step(const Vector<5>& mean, const Matrix<5>& information, double gate,
-                                           double loss_scale) {
+  [[nodiscard]] std::optional<double> step(const Vector<Numbers>& mean, const Matrix<Numbers>& information,
+                                           double gate, double loss_scale) {
     Matrix<shared> H;
     Vector<shared> g;
     gather(mean, information, gate, loss_scale, H, g);
@@ -131,22 +138,22 @@ public:
     for (Track& track : tracks_)
       track.point += track.elimination.solve(Vector<3>(track.gradient - product(track.coupling, d)));
     motion_ = retract(motion_, part_of<6, 1>(d, 0, 0));
-    state_ += part_of<5, 1>(d, 6, 0);
+    state_ += part_of<Numbers, 1>(d, 6, 0);
     return d.dot(g);
   }
 
   /// Covariance of the correction by the prior and the points inside `gate`, which tell `efficiency` of what
   /// least squares would make of them; nothing where the equations are degenerate.
-  [[nodiscard]] std::optional<Matrix<5>> covariance(const Matrix<5>& information, double gate,
-                                                    double efficiency) {
+  [[nodiscard]] std::optional<Matrix<Numbers>> covariance(const Matrix<Numbers>& information, double gate,
+                                                          double efficiency) {
     Matrix<shared> H;
     Vector<shared> g;
-    gather(state_, Matrix<5>::Zero(), gate, std::numeric_limits<double>::infinity(), H, g);
+    gather(state_, Matrix<Numbers>::Zero(), gate, std::numeric_limits<double>::infinity(), H, g);
     H *= efficiency;
-    put(H, 6, 6, Matrix<5>(part_of<5, 5>(H, 6, 6) + information));
+    put(H, 6, 6, Matrix<Numbers>(part_of<Numbers, Numbers>(H, 6, 6) + information));
     const Cholesky<shared> factor(H);
     if (!factor.good()) return std::nullopt;
-    const Matrix<5> result = part_of<5, 5>(factor.inverse(), 6, 6);
+    const Matrix<Numbers> result = part_of<Numbers, Numbers>(factor.inverse(), 6, 6);
     if (!all_finite(result)) return std::nullopt;
     return result;
   }
@@ -175,11 +182,30 @@ private:
     Vector<8> residual;
   };
 
+  /// Of the right camera at one moment.
+  struct RightPose {
+    Matrix<3> R;  // to the left camera
+    Vector<3> baseline;
+    Matrix<3, 2> by_direction;  // d direction / d (t_y, t_z), in the right camera's axes
+  };
+
+  [[nodiscard]] Vector<5> correction_after() const { return part_of<5, 1>(state_, 0, 0); }
+  [[nodiscard]] Vector<5> correction_before() const {
+    Vector<5> result = correction_after();
+    if constexpr (Numbers == 8)
+      for (int i = 0; i < 3; ++i) result(i) -= frames_ * state_(5 + i);
+    return result;
+  }
+  [[nodiscard]] RightPose right_pose(const Vector<5>& correction) const {
+    const Matrix<3> R = rig_.rotation(correction).matrix();
+    return {R, rig_.nominal().baseline() * rig_.direction(correction),
+            transposed_product(R, rig_.direction_jacobian())};
+  }
+
   /// Nothing where the point is behind a camera.
-  [[nodiscard]] std::optional<Linearised> linearise(const Track& track, const Matrix<3>& R,
-                                                    const Vector<3>& baseline) const {
+  [[nodiscard]] std::optional<Linearised> linearise(const Track& track,
+                                                    const std::array<RightPose, 2>& right_poses) const {
     const Matrix<3> R_after = transposed(motion_.rotation().matrix());
-    const Matrix<3, 2> by_direction = transposed_product(R, rig_.direction_jacobian());
     Linearised result;
     result.J_shared.setZero();
     for (const std::size_t moment : {0U, 1U}) {
@@ -190,6 +216,7 @@ private:
         p = product(R_after, shifted);
         by_point = R_after;
       }
+      const auto& [R, baseline, by_direction] = right_poses[moment];
       const Vector<3> arm = p - baseline, q = transposed_product(R, arm);
       constexpr double nearest = 1e-6;
       if (!(p(2) > nearest && q(2) > nearest)) return std::nullopt;
@@ -207,7 +234,10 @@ private:
         put(result.J_shared, row + 2, 0, Matrix<2, 3>(-right_by_p));
         put(result.J_shared, row + 2, 3, product(right_by_p, skew(p)));
       }
-      put(result.J_shared, row + 2, 6, product(right.J_point, skew(q)));
+      const Matrix<2, 3> by_rotation = product(right.J_point, skew(q));
+      put(result.J_shared, row + 2, 6, by_rotation);
+      if constexpr (Numbers == 8)
+        if (moment == 0) put(result.J_shared, row + 2, 11, Matrix<2, 3>(-frames_ * by_rotation));
       put(result.J_shared, row + 2, 9,
           Matrix<2>(-rig_.nominal().baseline() * product(right.J_point, by_direction)));
     }
@@ -219,19 +249,18 @@ private:
   }
 
   /// Normal equations of motion and correction with the points eliminated.
-  void gather(const Vector<5>& mean, const Matrix<5>& information, double gate, double loss_scale,
+  void gather(const Vector<Numbers>& mean, const Matrix<Numbers>& information, double gate, double loss_scale,
               Matrix<shared>& H, Vector<shared>& g) {
     H.setZero();
     g.setZero();
     put(H, 6, 6, information);
-    put(g, 6, 0, product(information, Vector<5>(mean - state_)));
-    const Matrix<3> R = rig_.rotation(state_).matrix();
-    const Vector<3> baseline = rig_.nominal().baseline() * rig_.direction(state_);
+    put(g, 6, 0, product(information, Vector<Numbers>(mean - state_)));
+    const std::array right_poses{right_pose(correction_before()), right_pose(correction_after())};
     for (Track& track : tracks_) {
       track.coupling.setZero();
       track.gradient.setZero();
       track.chi_squared = std::numeric_limits<double>::infinity();
-      const auto at = linearise(track, R, baseline);
+      const auto at = linearise(track, right_poses);
       if (!at) continue;
       Matrix<3> own = Matrix<3>::Zero();
       add_transposed_product(own, at->J_point, at->J_point);
@@ -252,28 +281,26 @@ private:
   }
 
   const RigCorrection& rig_;
-  Vector<5> state_;
+  Vector<Numbers> state_;
   SE3 motion_;
+  double frames_;  // between before and after
   std::vector<Track> tracks_;
 };
 
-}  // namespace detail
-
-/// Correction of the rig by one motion, given what is known of the correction beforehand: its mean `state`
-/// and positive definite `covariance`. `guess` is about the motion (within some tens of pixels). Points that
-/// cannot be triangulated or do not move with the others are left out. A motion with little parallax says
-/// little, and the covariance stays near the prior's. O(points) for each step; deterministic.
-[[nodiscard]] inline MotionCalibration calibrate_from_motion(const RigCorrection& rig, const Vector<5>& state,
-                                                             const Matrix<5>& covariance,
-                                                             std::span<const MovedPair> pairs,
-                                                             const SE3& guess,
-                                                             const MotionCalibrationOptions& options = {}) {
-  MotionCalibration result{state, covariance, guess};
-  const Cholesky<5> prior(covariance);
+/// The body of calibrate_from_motion(); `frames` from before to after, which a rate is told by.
+template <int Numbers>
+[[nodiscard]] MotionCalibrationOf<Numbers> calibrate_from_motion(const RigCorrection& rig,
+                                                                 const Vector<Numbers>& state,
+                                                                 const Matrix<Numbers>& covariance,
+                                                                 std::span<const MovedPair> pairs,
+                                                                 double frames, const SE3& guess,
+                                                                 const MotionCalibrationOptions& options) {
+  MotionCalibrationOf<Numbers> result{state, covariance, guess};
+  const Cholesky<Numbers> prior(covariance);
   CAIRN_EXPECTS(all_finite(state) && all_finite(covariance) && prior.good(),
                 "calibrate_from_motion: expected a finite state and a positive definite covariance");
-  const Matrix<5> information = prior.inverse();
-  detail::MotionCalibrationProblem problem(rig, state, guess, pairs);
+  const Matrix<Numbers> information = prior.inverse();
+  MotionCalibrationProblem<Numbers> problem(rig, state, guess, pairs, frames);
   if (problem.size() < options.min_inliers) return result;
   const double gate = chi_square_quantile(options.gate_probability, 5);
   result.status = MotionCalibrationStatus::degenerate;
@@ -291,12 +318,26 @@ private:
   if (!posterior || !all_finite(problem.state())) return result;
   result.inliers = problem.inside(gate);
   result.status = MotionCalibrationStatus::no_consensus;
-  if (!detail::enough_inliers(result.inliers, problem.size(), options)) return result;
+  if (!enough_inliers(result.inliers, problem.size(), options)) return result;
   result.status = MotionCalibrationStatus::good;
   result.state = problem.state();
   result.covariance = *posterior;
   result.T_before_after = problem.motion();
   return result;
+}
+
+}  // namespace detail
+
+/// Correction of the rig by one motion, given what is known of the correction beforehand: its mean `state`
+/// and positive definite `covariance`. `guess` is about the motion (within some tens of pixels). Points that
+/// cannot be triangulated or do not move with the others are left out. A motion with little parallax says
+/// little, and the covariance stays near the prior's. O(points) for each step; deterministic.
+[[nodiscard]] inline MotionCalibration calibrate_from_motion(const RigCorrection& rig, const Vector<5>& state,
+                                                             const Matrix<5>& covariance,
+                                                             std::span<const MovedPair> pairs,
+                                                             const SE3& guess,
+                                                             const MotionCalibrationOptions& options = {}) {
+  return detail::calibrate_from_motion<5>(rig, state, covariance, pairs, 1, guess, options);
 }
 
 }}  // namespace cairn::CAIRN_ABI
