@@ -195,6 +195,46 @@ TEST_SUITE("motion_calibration") {
     CHECK(off.state().norm() == 0.0);
   }
 
+  TEST_CASE("CalibrationDrift: a knock is believed from the first motion after it") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const RigCorrection correction(cairn_test::rectified_rig(0.5));
+    for (const double rate_sigma : {0.0, 5e-6})
+      for (const double size : {0.002, 0.02}) {  // 2 and 20 pixels
+        CAPTURE(size);
+        cairn::CalibrationDrift drift(correction.nominal(), {.rate_sigma = rate_sigma});
+        Vector<5> truth = Vector<5>::Zero();
+        const auto see = [&] {
+          (void)drift.update_moved(moved(correction.rig(truth), drive(2), 0.5, random, 200, 0.1), drive(2),
+                                   4);
+        };
+        const auto error = [&](int i) {
+          return std::abs(drift.state()(i) - truth(i)) / std::sqrt(drift.covariance()(i, i));
+        };
+        for (int k = 0; k < 10; ++k) see();
+        CHECK(error(1) < 4.5);
+        const double settled = drift.covariance()(1, 1);
+        truth.head<3>() += size * Vector<3>(0.48, 0.8, 0.36);
+        see();
+        CHECK(drift.covariance()(1, 1) > settled);
+        for (int i = 0; i < 3; ++i) CHECK(error(i) < 4.5);
+        for (int k = 0; k < 5; ++k) see();
+        CHECK(error(1) < 4.5);
+      }
+  }
+
+  TEST_CASE("CalibrationDrift: points that move as no scene does are no knock") {
+    cairn::Random random(cairn_test::seed());
+    const RigCorrection correction(cairn_test::rectified_rig(0.5));
+    cairn::CalibrationDrift drift(correction.nominal());
+    for (int k = 0; k < 5; ++k)
+      (void)drift.update_moved(moved(correction.nominal(), drive(2), 0.5, random), drive(2));
+    const Vector<5> before = drift.state();
+    (void)drift.update_moved(moved(correction.nominal(), drive(2), 0.5, random, 100, 1), drive(2));
+    CHECK((drift.state() - before).cwiseAbs().maxCoeff() < 1e-9);
+  }
+
   TEST_CASE(
       "CalibrationDrift: a camera that keeps turning is followed without a lag, and its rate is known") {
     const auto seed = cairn_test::seed();

@@ -80,7 +80,7 @@ public:
     for (const double positive : {options.initial_sigma, options.pixel_sigma, options.rate_memory})
       CAIRN_EXPECTS(std::isfinite(positive) && positive > 0,
                     "CalibrationDrift: expected positive sigmas and a memory of some frames");
-    covariance_ = initial(options.initial_sigma);
+    covariance_ = initial(options.initial_sigma, options.initial_sigma);
   }
 
   /// The rig with the correction so far.
@@ -121,14 +121,30 @@ public:
 
   /// Takes points seen before and after a motion, `frames` frames apart; `guess` is about the motion. Sees
   /// the yaw. The epipolar constraints of these points are part of it: do not give them to update() as well.
-  /// O(points).
+  /// Points that the foreseen rig cannot explain were seen after a knock: the correction starts again from
+  /// them alone. O(points).
   MotionCalibration update_moved(std::span<const MovedPair> pairs, const SE3& guess, int frames = 1,
                                  const MotionCalibrationOptions& options = {}) {
     CAIRN_EXPECTS(frames > 0, "CalibrationDrift: expected a motion of at least one frame");
     if (!options_.enabled) return {state(), covariance(), guess};
     walk(frames);
-    const auto result = detail::calibrate_from_motion<numbers>(correction_, state_, covariance_, pairs,
-                                                               frames, guess, options);
+    const auto told = [&](const State& state, const Covariance& covariance) {
+      return detail::calibrate_from_motion<numbers>(correction_, state, covariance, pairs, frames, guess,
+                                                    options);
+    };
+    auto result = told(state_, covariance_);
+    if (!result.good() || is_knock(result.state - state_)) {
+      State unmoved = state_;
+      unmoved.tail<3>().setZero();
+      constexpr double largest = 0.1;                                             // [rad]
+      for (double sigma = options_.initial_sigma; sigma < largest; sigma *= 4) {  // as vague as it takes
+        const auto anew = told(unmoved, initial(sigma, options_.initial_sigma));
+        const Vector<3> turn = part_of<3, 1>(State(anew.state - unmoved), 0, 0);
+        if (!anew.good() || turn.cwiseAbs().maxCoeff() > 2 * sigma) continue;
+        result = anew;
+        break;
+      }
+    }
     state_ = result.state;
     covariance_ = result.covariance;
     return {state(), covariance(), result.T_before_after, result.inliers, result.status};
@@ -161,10 +177,18 @@ private:
   }
 
   /// Of a correction that nothing has been seen of.
-  [[nodiscard]] Covariance initial(double sigma) const {
-    Covariance result = Covariance::Identity() * (sigma * sigma);
-    for (int i = 5; i < numbers; ++i) result(i, i) = rate_variance();
+  [[nodiscard]] Covariance initial(double rotation, double baseline) const {
+    Covariance result = Covariance::Zero();
+    for (int i = 0; i < numbers; ++i)
+      result(i, i) = i < 3 ? squared(rotation) : i < 5 ? squared(baseline) : rate_variance();
     return result;
+  }
+
+  /// Whether an estimate lies where what was foreseen does not reach: once in 1e9 by chance. On recorded
+  /// drives whose rig stands still up to 32 was seen, after knocks of 4 mrad 60 to 350.
+  [[nodiscard]] bool is_knock(const State& step) const {
+    const double distance = step.dot(Cholesky<numbers>(covariance_).solve(step));
+    return distance > chi_square_quantile(1 - 1e-9, numbers);
   }
 
   /// A rate that is known keeps the covariance positive definite.
@@ -250,7 +274,7 @@ private:
   void start_again(const std::vector<Rays>& rays) {
     const double focal = 0.5 * (correction_.nominal().left.fy() + correction_.nominal().right.fy());
     const double sigma = std::max(options_.initial_sigma, 2 * typical_distance(rays) / focal);
-    covariance_ = initial(sigma);
+    covariance_ = initial(sigma, sigma);
     state_.tail<3>().setZero();
     const State before = state_;
     std::vector<double> sizes(rays.size());
