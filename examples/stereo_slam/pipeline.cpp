@@ -243,13 +243,14 @@ void Pipeline::choose_calibration() {
   map_ = cairn::KeyframeMap(rig_, with_rig);
 }
 
-/// A rig that was as its file says and no longer is has come loose. One frame can be wrong.
+/// A rig that no longer is as the map knows it has come loose. One frame can be wrong.
 void Pipeline::watch_rig() {
-  constexpr int beyond_chance = 5;
-  if (options_.calibrate != Calibration::automatic || corrects_rig()) return;
+  if (options_.calibrate != Calibration::automatic) return;
   const VerticalDisparity seen = disparity_of_locals();
+  constexpr int beyond_chance = 5;
   shown_off_ = seen.shows() ? shown_off_ + 1 : 0;
-  if (shown_off_ < beyond_chance) return;
+  const bool loose = map_.rig_correction() ? disparity_watch_.departs(seen) : shown_off_ >= beyond_chance;
+  if (!loose) return;
   follow_rig("from frame " + std::to_string(step_) + " on: " + in_words(seen));
   record_.notes.push_back("the rig has come loose; its right camera is followed " + record_.calibration.why);
 }
@@ -258,12 +259,14 @@ void Pipeline::follow_rig(const std::string& why) {
   record_.calibration.on = true;
   record_.calibration.why = why;
   loose_ = rig_;
+  calibration_ = SelfCalibration(rig_, options_.calibration);
 }
 
+/// Against the rig as given, which stays the same while the map's estimate changes.
 VerticalDisparity Pipeline::disparity_of_locals() const {
   std::vector<cairn::PixelPair> pairs;
   for (const LocalLandmark& local : locals_) pairs.push_back({local.left_pixel, local.right_pixel});
-  return vertical_disparity(rig_, pairs);
+  return vertical_disparity(map_.nominal_rig(), pairs);
 }
 
 /// Every other frame: where it is, and what the map learns by it.
@@ -714,7 +717,7 @@ void Pipeline::calibrate(const Located& located) {
 
 void Pipeline::look_through(const cairn::StereoRig& rig) {
   rig_ = rig;
-  find_pairs_by(rig);
+  find_pairs_by(loose_.value_or(rig));
 }
 
 void Pipeline::find_pairs_by(const cairn::StereoRig& rig) {
@@ -824,10 +827,11 @@ RunRecord Pipeline::record() {
     const cairn::RigState before = options_.rig.each();
     for (int i = 0; i < cairn::rig_numbers; ++i)  // what is held to be known was not estimated
       record.calibration.sigmas(i) = before(i) > 0 ? std::sqrt(rig->covariance(i, i)) : 0;
-  } else if (loose_) {
+  }
+  if (loose_) {
     const cairn::CalibrationDrift known = calibration_.now();
     record.rig = known.corrected();
-    record.calibration.numbers.head<5>() = known.state();
+    record.calibration.numbers.head<5>() = cairn::RigCorrection(map_.nominal_rig()).state(record.rig);
     record.calibration.sigmas.head<5>() = known.covariance().diagonal().cwiseSqrt();
   }
   record.landmarks.reserve(landmarks_.size());

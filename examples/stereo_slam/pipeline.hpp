@@ -217,6 +217,7 @@ private:
   cairn::StereoRig rig_;                   // as the map knows it
   std::optional<cairn::StereoRig> loose_;  // as it is now, where it is followed
   int shown_off_ = 0;                      // looks in a row that showed that it is not as the map knows it
+  DisparityWatch disparity_watch_;         // where the map estimates it
   std::optional<FrontEnd> front_end_;      // made for the first frame that comes without points
   const cairn::Features* left_ = nullptr;  // of the frame that is worked on
   cairn::ImageView image_;                 // its left image

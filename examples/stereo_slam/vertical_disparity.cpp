@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <utility>
 #include <vector>
 
 #include <cairn/core/cholesky.hpp>
@@ -69,6 +71,23 @@ VerticalDisparity vertical_disparity(const cairn::StereoRig& rig, std::span<cons
   const cairn::Matrix<3> P = cairn::Cholesky<3>(information).inverse() * (scale * scale);
   return {plane(0),           plane(1),           plane(2),  std::sqrt(P(0, 0)),
           std::sqrt(P(1, 1)), std::sqrt(P(2, 2)), all.size()};
+}
+
+bool DisparityWatch::departs(const VerticalDisparity& seen) {
+  constexpr std::size_t recent = 5, least = 10, most = 40;
+  constexpr double pixels = 0.5, deviations = 6;
+  if (seen.points == 0) return false;
+  offsets_.push_back(seen.offset);
+  if (offsets_.size() > most + recent) offsets_.pop_front();
+  if (offsets_.size() < least + recent) return false;
+  const auto since = offsets_.end() - recent;
+  const double usual = cairn::median(std::vector<double>(offsets_.begin(), since));
+  std::vector<double> sizes;
+  std::transform(offsets_.begin(), since, std::back_inserter(sizes),
+                 [&](double offset) { return std::abs(offset - usual); });
+  const double enough = std::max(pixels, deviations * 1.4826 * cairn::median(std::move(sizes)));
+  return std::all_of(since, offsets_.end(), [&](double offset) { return offset - usual > enough; }) ||
+         std::all_of(since, offsets_.end(), [&](double offset) { return usual - offset > enough; });
 }
 
 }  // namespace stereo_slam

@@ -49,6 +49,11 @@ const std::vector<StereoFrame>& drive() {
   return frames;
 }
 
+const std::vector<StereoFrame>& longer_drive() {
+  static const std::vector<StereoFrame> frames = render(small_arena(), 41);
+  return frames;
+}
+
 const cairn::StereoRig& rig() {
   static const cairn::StereoRig result = stereo_slam::open_arena(small_arena(), 1, 1)->rig();
   return result;
@@ -61,8 +66,9 @@ PipelineOptions options(unsigned threads = 1) {
   return result;
 }
 
-RunRecord run(const std::vector<StereoFrame>& frames, const PipelineOptions& with) {
-  stereo_slam::Pipeline pipeline(rig(), with);
+RunRecord run(const std::vector<StereoFrame>& frames, const PipelineOptions& with,
+              const cairn::StereoRig& as_given = rig()) {
+  stereo_slam::Pipeline pipeline(as_given, with);
   for (const StereoFrame& frame : frames) pipeline.step(frame);
   return pipeline.record();
 }
@@ -142,7 +148,7 @@ TEST_SUITE("pipeline") {
   // By keypoints it is -0.26 mrad here (seeds 2 and 3: -0.07 and -0.17), by patches -0.008 (-0.012 and
   // -0.031). The bound between them is a fortieth of a pixel.
   TEST_CASE("pipeline: a rig that is knocked loose is noticed, said and followed, to the same bits") {
-    std::vector<StereoFrame> frames = render(small_arena(), 41);
+    std::vector<StereoFrame> frames = longer_drive();
     const RunRecord untouched = run(frames, options());
     CHECK_FALSE(untouched.calibration.on);
     CHECK(untouched.notes.empty());
@@ -171,6 +177,44 @@ TEST_SUITE("pipeline") {
     CAPTURE(error_at_end(followed));
     CHECK(error_at_end(followed) < 0.5 * error_at_end(believed));
     CHECK(same_bits(followed, run(frames, options(3))));
+  }
+
+  TEST_CASE(
+      "pipeline: a rig that its file has wrong, and that is knocked loose besides, is followed from then "
+      "on") {
+    cairn::StereoRig as_given = rig();
+    as_given.T_left_right =
+        as_given.T_left_right *
+        cairn::SE3(cairn::SO3::exp(cairn::Vector<3>(-1e-3, 0, 5e-4)), cairn::Vector<3>::Zero());
+    std::vector<StereoFrame> frames = longer_drive();
+    const RunRecord untouched = run(frames, options(), as_given);
+    REQUIRE(untouched.calibration.on);
+    CHECK(untouched.calibration.why.find("vertical disparity") == 0);
+    CHECK(untouched.notes.empty());
+    constexpr std::size_t knock = 20;
+    for (std::size_t i = knock; i < frames.size(); ++i) frames[i].right = moved_by_a_pixel(frames[i].right);
+    PipelineOptions in_the_map = options();
+    in_the_map.calibrate = stereo_slam::Calibration::on;
+    const RunRecord believed = run(frames, in_the_map, as_given), followed = run(frames, options(), as_given);
+    REQUIRE(followed.notes.size() == 1);
+    CHECK(followed.notes[0].find("the rig has come loose") == 0);
+    const double pixel = 1 / rig().right.fx();
+    const cairn::Vector<3> found = followed.calibration.numbers.head<3>(), truth(1e-3 + pixel, -pixel, -5e-4);
+    CAPTURE(found.transpose());
+    CAPTURE(truth.transpose());
+    CHECK((found - truth).norm() < 0.5 * pixel);
+    CHECK((followed.rig.T_left_right.rotation().matrix() -
+           (as_given.T_left_right.rotation() * cairn::SO3::exp(found)).matrix())
+              .norm() < 0.2 * pixel);
+    const auto error_at_end = [](const RunRecord& record) {
+      const FrameRecord& last = record.frames.back();
+      return cairn::local(*last.truth, last.T_world_camera).head<3>().norm();
+    };
+    CAPTURE(error_at_end(untouched));
+    CAPTURE(error_at_end(believed));
+    CAPTURE(error_at_end(followed));
+    CHECK(error_at_end(followed) < 0.7 * error_at_end(believed));
+    CHECK(same_bits(followed, run(frames, options(3), as_given)));
   }
 
   TEST_CASE("pipeline: the floor does not pitch the camera, because landmarks are where their surface is") {

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include "vertical_disparity.hpp"
 
+#include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -52,6 +54,33 @@ TEST_SUITE("vertical_disparity") {
     CHECK(std::abs(seen.slope_x) == doctest::Approx(0.384).epsilon(0.4));  // half a width by 1 mrad
     CHECK(seen.sigma_x < 0.08);
     CHECK(seen.points == 500);
+  }
+
+  TEST_CASE(
+      "DisparityWatch: a knock is noticed in the fifth frame, scenes that differ and single frames are not") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const auto frame = [&](double offset) {
+      return stereo_slam::VerticalDisparity{
+          offset + random.normal(0, 0.05), random.normal(0, 1), 0, 0.01, 0.01, 0.01, 300};
+    };
+    for (const double knock : {1.5, -1.5}) {
+      stereo_slam::DisparityWatch watch;
+      // A rig that is off by 0.8 pixels; what lenses leave over swings by 0.1 as scenes pass.
+      const auto usual = [&](int k) { return 0.8 + 0.1 * std::sin(0.15 * k); };
+      for (int k = 0; k < 400; ++k) CHECK_FALSE(watch.departs(frame(usual(k) + (k % 9 == 0 ? knock : 0))));
+      CHECK_FALSE(watch.departs({}));  // nothing seen is nothing new
+      int frames = 0;
+      for (bool noticed = false; !noticed && frames < 50; ++frames)
+        noticed = watch.departs(frame(usual(400) + knock));
+      CHECK(frames == 5);
+    }
+  }
+
+  TEST_CASE("DisparityWatch: knows nothing at first") {
+    stereo_slam::DisparityWatch watch;
+    for (int k = 0; k < 14; ++k) CHECK_FALSE(watch.departs({k < 5 ? 0.0 : 9.0, 0, 0, 0.01, 0.01, 0.01, 300}));
   }
 
   TEST_CASE("vertical_disparity: few points say nothing") {

@@ -11,6 +11,7 @@
 #include <cairn/slam/detail/whitened_sighting.hpp>
 
 #include "support/random.hpp"
+#include "support/violation.hpp"
 
 namespace {
 
@@ -40,6 +41,24 @@ StereoRig rig() {
 }  // namespace
 
 TEST_SUITE("rig_correction") {
+  TEST_CASE("rig_correction: a rig gives back the five numbers that it was made of") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const cairn::RigCorrection correction(rig());
+    for (const double size : {1e-6, 1e-3, 0.3})
+      for (int run = 0; run < 20; ++run) {
+        Vector<5> state;
+        for (int i = 0; i < 5; ++i) state(i) = random.uniform(-size, size);
+        StereoRig off = correction.rig(state);
+        off.T_left_right = SE3(off.T_left_right.rotation(), 1.7 * off.T_left_right.translation());
+        CHECK((correction.state(off) - state).cwiseAbs().maxCoeff() < 1e-14 + 1e-12 * size);
+      }
+    StereoRig behind = rig();
+    behind.T_left_right = SE3(behind.T_left_right.rotation(), -behind.T_left_right.translation());
+    CHECK_FALSE(cairn_test::violation_of([&] { (void)correction.state(behind); }).empty());
+  }
+
   TEST_CASE("rig_correction: no correction is the nominal rig, and each number does what it is called") {
     const StereoRig nominal = rig();
     const cairn::RigCorrection correction(nominal);

@@ -94,6 +94,17 @@ public:
     return result;
   }
 
+  /// The numbers of (1) that make of the nominal rig the pose of another one's right camera, but for the
+  /// length of its baseline, which must not be turned by a right angle or more: the inverse of rig().
+  [[nodiscard]] Vector<5> state(const StereoRig& other) const {
+    const Vector<3> w = (nominal_.T_left_right.rotation().inverse() * other.T_left_right.rotation()).log();
+    const Vector<3> t = transposed_product(axes_, other.T_left_right.translation());
+    CAIRN_EXPECTS(t(0) > 0, "RigCorrection: expected a baseline within a right angle of the nominal one");
+    Vector<5> result;
+    result << w(0), w(1), w(2), t(1) / t(0), t(2) / t(0);
+    return result;
+  }
+
   /// (1) and (2). Throws Error where the numbers, or the rig that comes of them, are not finite.
   [[nodiscard]] StereoRig rig(const RigState& state) const {
     StereoRig result = rig(loose(state));
