@@ -84,6 +84,12 @@ bool same_bits(const RunRecord& a, const RunRecord& b) {
   return true;
 }
 
+/// Of the position [m].
+double error_at_end(const RunRecord& record) {
+  const FrameRecord& last = record.frames.back();
+  return cairn::local(*last.truth, last.T_world_camera).head<3>().norm();
+}
+
 /// The image a pixel farther down and to the right.
 cairn::Image moved_by_a_pixel(const cairn::Image& image) {
   cairn::Image moved = image;
@@ -168,10 +174,6 @@ TEST_SUITE("pipeline") {
     CAPTURE(found.transpose());
     CAPTURE(truth.transpose());
     CHECK((found - truth).norm() < 0.3 * pixel);
-    const auto error_at_end = [](const RunRecord& record) {
-      const FrameRecord& last = record.frames.back();
-      return cairn::local(*last.truth, last.T_world_camera).head<3>().norm();
-    };
     CAPTURE(error_at_end(untouched));
     CAPTURE(error_at_end(believed));
     CAPTURE(error_at_end(followed));
@@ -206,10 +208,6 @@ TEST_SUITE("pipeline") {
     CHECK((followed.rig.T_left_right.rotation().matrix() -
            (as_given.T_left_right.rotation() * cairn::SO3::exp(found)).matrix())
               .norm() < 0.2 * pixel);
-    const auto error_at_end = [](const RunRecord& record) {
-      const FrameRecord& last = record.frames.back();
-      return cairn::local(*last.truth, last.T_world_camera).head<3>().norm();
-    };
     CAPTURE(error_at_end(untouched));
     CAPTURE(error_at_end(believed));
     CAPTURE(error_at_end(followed));
