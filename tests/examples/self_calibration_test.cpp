@@ -18,16 +18,12 @@ namespace {
 using cairn::SE3;
 using cairn::SO3;
 using cairn::Vector;
+using cairn_test::turned;
 using stereo_slam::SelfCalibration;
 using stereo_slam::Sighting;
 
 constexpr cairn::CalibrationDriftOptions options{
     .initial_sigma = 3e-4, .walk_rotation = 1e-5, .walk_baseline = 1e-6};
-
-cairn::StereoRig turned(cairn::StereoRig rig, const Vector<3>& w) {
-  rig.T_left_right = rig.T_left_right * SE3(SO3::exp(w), Vector<3>::Zero());
-  return rig;
-}
 
 /// Drives `frames` frames of half a metre through a cloud of points, and tells `calibration` what `first`
 /// saw, whose right camera turns by `turn` in every frame. How often that corrected the rig.

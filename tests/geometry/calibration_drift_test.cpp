@@ -25,9 +25,9 @@ using cairn::CalibrationHealth;
 using cairn::Matrix;
 using cairn::PixelPair;
 using cairn::SE3;
-using cairn::SO3;
 using cairn::StereoRig;
 using cairn::Vector;
+using cairn_test::turned;
 
 /// One frame's matches seen by `rig`, a share of them wrong.
 std::vector<PixelPair> frame(const StereoRig& rig, cairn::Random& random, std::size_t count = 200,
@@ -40,12 +40,6 @@ std::vector<PixelPair> frame(const StereoRig& rig, cairn::Random& random, std::s
     pair = {x.head<2>(), x.tail<2>()};
   }
   return pairs;
-}
-
-/// `rig` with its right camera turned by w.
-StereoRig turned(StereoRig rig, const Vector<3>& w) {
-  rig.T_left_right = rig.T_left_right * SE3(SO3::exp(w), Vector<3>::Zero());
-  return rig;
 }
 
 Vector<3> rotation_error(const StereoRig& found, const StereoRig& truth) {

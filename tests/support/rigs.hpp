@@ -105,4 +105,10 @@ inline std::vector<cairn::StereoMatch> random_matches(const cairn::StereoRig& ri
   return matches;
 }
 
+/// `rig` with its right camera turned by w [rad].
+inline cairn::StereoRig turned(cairn::StereoRig rig, const cairn::Vector<3>& w) {
+  rig.T_left_right = rig.T_left_right * cairn::SE3(cairn::SO3::exp(w), cairn::Vector<3>::Zero());
+  return rig;
+}
+
 }  // namespace cairn_test

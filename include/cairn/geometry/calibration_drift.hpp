@@ -136,8 +136,9 @@ public:
     if (!result.good() || is_knock(result.state - state_)) {
       State unmoved = state_;
       unmoved.tail<3>().setZero();
-      constexpr double largest = 0.1;                                             // [rad]
-      for (double sigma = options_.initial_sigma; sigma < largest; sigma *= 4) {  // as vague as it takes
+      // As vague as it takes, up to this [rad].
+      constexpr double largest = 0.1;
+      for (double sigma = options_.initial_sigma; sigma < largest; sigma *= 4) {
         const auto anew = told(unmoved, initial(sigma, options_.initial_sigma));
         const Vector<3> turn = part_of<3, 1>(State(anew.state - unmoved), 0, 0);
         if (!anew.good() || turn.cwiseAbs().maxCoeff() > 2 * sigma) continue;
