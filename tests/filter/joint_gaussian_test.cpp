@@ -234,8 +234,9 @@ TEST_SUITE("joint_gaussian") {
         const Dense expected =
             t * (a * prior * a.transposed() + gain * r * gain.transposed()) * t.transposed();
 
-        REQUIRE(
-            JointExtended{.iterations = iterations}.update(belief, sensor, z, first, landmark).accepted());
+        REQUIRE(JointExtended{.iterations = iterations, .settled = std::numeric_limits<double>::infinity()}
+                    .update(belief, sensor, z, first, landmark)
+                    .accepted());
         // where costs are compared, steps below the root of their rounding are not seen
         CHECK(cairn::local(belief.mean(first), cairn::retract(pose, part(0))).norm() < 1e-7);
         CHECK(cairn::local(belief.mean(second), cairn::retract(other, part(5))).norm() < 1e-7);
@@ -735,6 +736,9 @@ TEST_SUITE("joint_gaussian") {
     CHECK(status(JointExtended{.gate = nan}, Sighting{}, z) == Status::bad_option);
     CHECK(status(JointExtended{.form = Form::sequential}, Sighting{}, z) == Status::bad_option);
     CHECK(status(JointExtended{.iterations = 0}, Sighting{}, z) == Status::bad_option);
+    CHECK(status(JointExtended{.iterations = 3, .tolerance = std::nan("")}, Sighting{}, z) ==
+          Status::bad_option);
+    CHECK(status(JointExtended{.iterations = 3, .settled = -1}, Sighting{}, z) == Status::bad_option);
     CHECK(filter.update(belief, Sighting{}, z, robot, BlockId<Vector<2>>{}).status == Status::unknown_block);
     CHECK(filter.innovation(belief, Sighting{}, z, robot, BlockId<Vector<2>>{robot}).status ==
           Status::unknown_block);
@@ -1100,6 +1104,37 @@ TEST_SUITE("joint_gaussian") {
     const std::array<AnyBlockId, 2> two{keyframe, body};
     const Vector<d> error = Vector<d>::Constant(15, 0.1);
     CHECK(large.nees(two, error) == doctest::Approx(6 * 0.1 + 9 * 0.01));
+  }
+
+  TEST_CASE("joint: iterations that have not settled are refused, and the belief is left") {
+    struct Cube {
+      using State = Vector<1>;
+      using Measurement = Vector<1>;
+      double variance;
+      [[nodiscard]] Vector<1> predict(const Vector<1>& x) const { return Vector<1>(x(0) * x(0) * x(0)); }
+      [[nodiscard]] Matrix<1> jacobian(const Vector<1>& x) const { return Matrix<1>(3 * x(0) * x(0)); }
+      [[nodiscard]] Matrix<1> noise(const Vector<1>&) const { return Matrix<1>(variance); }
+    };
+    for (const double variance : {1e-4, 0.0})  // measured exactly, too
+      for (const int iterations : {2, 3, 5, 30}) {
+        CAPTURE(variance);
+        CAPTURE(iterations);
+        JointGaussian<Vector<1>> belief;
+        const auto id = belief.add(Vector<1>(0.3), Matrix<1>(1.0)).id;
+        const auto in =
+            JointExtended{.iterations = iterations}.update(belief, Cube{variance}, Vector<1>(8.0), id);
+        if (iterations < 10) {
+          CHECK(in.status == Status::not_converged);
+          CHECK(belief.mean(id)(0) == 0.3);
+          CHECK(belief.covariance(id)(0, 0) == 1.0);
+        } else {
+          // Near 2, where the cube is 8 and its derivative 12: -(x - 0.3) = (x^3 - 8) 12 / variance.
+          REQUIRE(in.accepted());
+          CHECK(belief.mean(id)(0) == doctest::Approx(2 - variance * 1.7 / 144).epsilon(1e-9));
+          CHECK(std::sqrt(belief.covariance(id)(0, 0)) ==
+                doctest::Approx(std::sqrt(variance / 144)).epsilon(1e-3));
+        }
+      }
   }
 }
 

@@ -115,8 +115,9 @@ struct JointExtended {
   /// others by its root; >= 1
   double fading = 1.0;
   double stabilising_noise = 0.0;  ///< variance added to every number of what moves at each predict; >= 0
-  int iterations = 1;              ///< of the update; 1 is the plain filter
-  double tolerance = 1e-10;        ///< iterations end when the step changes by less, in standard deviations
+  int iterations = 1;              ///< of the update, at most; 1 is the plain filter
+  double tolerance = 1e-10;        ///< iterations end when the step changes by less, in the new deviations
+  double settled = 1e-3;           ///< refused as not_converged where they end with a larger change
 
   /// Moves the named blocks, which together are the process's State, by one step of dt. Their correlations
   /// with all others are carried along; the others stay. O(n d^2).
@@ -138,7 +139,8 @@ struct JointExtended {
       JointGaussian<Kinds...>& belief, const H& sensor, const typename H::Measurement& z,
       BlockId<X>... ids) const;
 
-  /// What update() would say of it; nothing is changed. O(d^2 + m^3), whatever the number of blocks.
+  /// What update() would say of it, but for what only updating shows: digits that are lost, iterations that
+  /// do not converge. Nothing is changed. O(d^2 + m^3), whatever the number of blocks.
   template <LinearisedMeasurement H, class... Kinds, class... X>
     requires detail::SpeaksOf<typename H::State, X...>
   [[nodiscard]] Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> innovation(
@@ -235,12 +237,30 @@ struct SensorFromPrior {
   bool (*linearise)(SensorFromPrior& at, const Vector<dynamic, S>& step, bool with_jacobian) = nullptr;
 };
 
+/// The square of a step p c in deviations after the update, c^T p c + |j p c|^2 by the noise's covariance r.
+/// A noise that is singular is taken for what rounding leaves of hph, what the state adds to it.
+template <class S>
+[[nodiscard]] S squared_deviations(const Vector<dynamic, S>& c, const Vector<dynamic, S>& step,
+                                   const Vector<dynamic, S>& seen, const Matrix<dynamic, dynamic, S>& r,
+                                   const Matrix<dynamic, dynamic, S>& hph) {
+  S sum(0);
+  for (int i = 0; i < static_cast<int>(c.size()); ++i) sum += c(i) * step(i);
+  Cholesky<dynamic, S> root(r);
+  if (!root.good()) {
+    Matrix<dynamic, dynamic, S> least = r;
+    for (int i = 0; i < static_cast<int>(r.rows()); ++i)
+      least(i, i) += S(64) * std::numeric_limits<S>::epsilon() * (hph(i, i) + r(i, i));
+    root = Cholesky<dynamic, S>(least);
+  }
+  return root.good() ? sum + root.whiten(seen).squaredNorm() : std::numeric_limits<S>::infinity();
+}
+
 /// Gauss-Newton on the posterior of the named blocks alone, p being their covariance: the mode of all blocks
 /// is that of the named ones and what the others expect given those. The step is p y, so that p may be
 /// singular; extended.hpp says the rest. Leaves in `at` the last linearisation.
 template <class S>
 [[nodiscard]] Status iterate(SensorFromPrior<S>& at, const Matrix<dynamic, dynamic, S>& p, int iterations,
-                             double tolerance, Vector<dynamic, S>& y) {
+                             double tolerance, double settled, Vector<dynamic, S>& y) {
   using Column = Vector<dynamic, S>;
   const int n = static_cast<int>(p.rows());
   const auto times = [n](const Matrix<dynamic, dynamic, S>& a, const Column& x) {
@@ -261,7 +281,7 @@ template <class S>
   };
   y = Column::Zero(n);
   Column e = Column::Zero(n);
-  S cost(0);
+  S cost(0), size(0);  // size of the last change
   SensorFromPrior<S> last = at;
   if (!cost_at(y, e, cost)) return Status::size_mismatch;
   for (int k = 0; k < iterations; ++k) {
@@ -271,7 +291,7 @@ template <class S>
     at.residual += times(at.jacobian, e);
     if (!all_finite(at.residual) || !all_finite(at.jacobian)) return Status::not_finite;
     last = at;
-    Matrix<dynamic, dynamic, S> covariance = at.noise, hp(m, n);
+    Matrix<dynamic, dynamic, S> hph = Matrix<dynamic, dynamic, S>::Zero(m, m), hp(m, n);
     for (int j = 0; j < n; ++j)
       for (int i = 0; i < m; ++i) {
         S sum(0);
@@ -280,8 +300,8 @@ template <class S>
       }
     for (int j = 0; j < m; ++j)
       for (int i = 0; i < m; ++i)
-        for (int l = 0; l < n; ++l) covariance(i, j) += hp(i, l) * at.jacobian(j, l);
-    const Cholesky<dynamic, S> root(symmetrised(covariance));
+        for (int l = 0; l < n; ++l) hph(i, j) += hp(i, l) * at.jacobian(j, l);
+    const Cholesky<dynamic, S> root(symmetrised(at.noise + hph));
     if (!root.good()) return Status::not_positive_definite;
     const Column weighted = root.solve(at.residual);
     Column change(n);
@@ -289,6 +309,7 @@ template <class S>
       change(j) = -y(j);
       for (int i = 0; i < m; ++i) change(j) += at.jacobian(i, j) * weighted(i);
     }
+    size = std::sqrt(squared_deviations<S>(change, times(p, change), times(hp, change), at.noise, hph));
     S lower(0);
     Column next, step;
     for (int halving = 0; halving <= 10; ++halving) {
@@ -302,10 +323,11 @@ template <class S>
     y = next;
     e = step;
     cost = lower;
-    if (dot(change, times(p, change)) <= static_cast<S>(tolerance * tolerance)) break;
+    if (size <= static_cast<S>(tolerance)) break;
   }
   at = last;
-  return all_finite(e) ? Status::accepted : Status::not_finite;
+  if (!all_finite(e)) return Status::not_finite;
+  return size <= static_cast<S>(settled) ? Status::accepted : Status::not_converged;
 }
 
 /// A jacobian by steps from x (+) e, block by block made one by steps from x.
@@ -397,7 +419,8 @@ private:
 
 template <int M, class S>
 Status JointExtended::verdict(Innovation<M, S>& in, const Cholesky<M, S>& root, Vector<M, S>& y) const {
-  if (!(gate > 0.0) || iterations < 1 || form == Form::sequential) return Status::bad_option;
+  if (!(gate > 0.0) || iterations < 1 || !(tolerance >= 0.0) || !(settled >= 0.0) || form == Form::sequential)
+    return Status::bad_option;
   if (!all_finite(in.residual) || !all_finite(in.covariance)) return Status::not_finite;
   if (!root.good()) return Status::not_positive_definite;
   y = root.whiten(in.residual);
@@ -563,7 +586,7 @@ Status JointExtended::iterated(JointGaussian<Kinds...>& belief, const H& sensor,
   Matrix<dynamic, dynamic, S> p(n, n);
   detail::JointCovariance<S>& core = belief.core_;
   core.read(ranges, ranges, p.data());
-  const Status found = detail::iterate<S>(mode, p, iterations, tolerance, dual);
+  const Status found = detail::iterate<S>(mode, p, iterations, tolerance, settled, dual);
   if (found != Status::accepted) return found;
   Matrix<dynamic, dynamic, S> covariance = mode.noise;
   const auto last = belief.template parts<dynamic, X...>(mode.jacobian, ids...);
