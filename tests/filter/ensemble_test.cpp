@@ -214,6 +214,7 @@ TEST_SUITE("particle") {
     CHECK(cairn::resample_by_kld(weightless, {}, bin, random) == Status::depleted);
     auto one = cairn::Particles<Vector<1>>::equal({Vector<1>(0.0)});
     CHECK(cairn::resample_by_kld(one, {.epsilon = 0.0}, bin, random) == Status::bad_option);
+    CHECK(cairn::resample_by_kld(one, {.z = std::nan("")}, bin, random) == Status::bad_option);
     CHECK(cairn::resample_by_kld(one, {.least = 5, .most = 4}, bin, random) == Status::bad_option);
     CHECK(one.size() == 1);
   }

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 #include <cstdint>
+#include <new>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -25,6 +26,21 @@ Particles<Vector<2>> three() {
   particles.log_weights = {std::log(0.2), std::log(0.5), std::log(0.3)};
   return particles;
 }
+
+/// A state of which so many copies more can be made.
+struct Dear {
+  int number = 0;
+  int* copies = nullptr;
+
+  Dear(int n, int& left) : number(n), copies(&left) {}
+  Dear(const Dear& other) : number(other.number), copies(other.copies) {
+    if ((*copies)-- == 0) throw std::bad_alloc();
+  }
+  Dear(Dear&&) noexcept = default;
+  Dear& operator=(const Dear&) = default;
+  Dear& operator=(Dear&&) noexcept = default;
+  ~Dear() = default;
+};
 
 }  // namespace
 
@@ -67,6 +83,25 @@ TEST_SUITE("particle") {
               cairn::Status::accepted);
       CHECK((particles.effective_size() > 2.99) == (share > 0.877));
     }
+  }
+
+  TEST_CASE("particle: where a state cannot be copied, neither states nor weights have changed") {
+    cairn::Random random(cairn_test::seed());
+    int copies = 1000;
+    Particles<Dear> particles;
+    for (int i = 0; i < 3; ++i) particles.states.emplace_back(i, copies);
+    particles.log_weights = three().log_weights;
+    const std::vector<double> unlike{0, -20, -30};
+    const cairn::ParticleFilter filter{.resample_below = 1};
+    for (int allowed = 0; allowed < 3; ++allowed) {
+      copies = allowed;
+      CHECK_THROWS_AS(static_cast<void>(filter.update_with(particles, unlike, random)), std::bad_alloc);
+      CHECK(particles.log_weights == three().log_weights);
+      for (int i = 0; i < 3; ++i) CHECK(particles.states[static_cast<std::size_t>(i)].number == i);
+    }
+    copies = 1000;
+    REQUIRE(filter.update_with(particles, unlike, random) == cairn::Status::accepted);
+    CHECK(particles.effective_size() > 2.99);
   }
 }
 

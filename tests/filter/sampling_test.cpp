@@ -114,6 +114,11 @@ TEST_SUITE("particle") {
     // k = 101 bins: the chi-square quantile with 100 degrees of freedom at 99 % is 135.807
     CHECK(std::abs(static_cast<double>(cairn::kld_particle_count(101, 0.05)) - 135.807 / 0.1) < 3.0);
     CHECK(cairn::kld_particle_count(1) == 1);
+    // What no number counts is the largest; a quantile far below the middle asks for one.
+    for (const double epsilon : {1e-21, 1e-300, 0.0})
+      CHECK(cairn::kld_particle_count(100, epsilon) == std::numeric_limits<std::size_t>::max());
+    CHECK(cairn::kld_particle_count(2, 0.05, -3) == 1);
+    CHECK(cairn::kld_particle_count(2, std::numeric_limits<double>::infinity()) == 1);
     CHECK(cairn::kld_particle_count(1000) > cairn::kld_particle_count(100));
   }
 

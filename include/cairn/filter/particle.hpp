@@ -133,14 +133,16 @@ inline std::vector<double> sorted_uniforms(std::size_t count, Random& random) {
 /// Number of particles that keeps the Kullback-Leibler distance of the sampled from the true distribution
 /// below `epsilon` with confidence given by the normal quantile `z`, when they fall into `bins` bins (D. Fox,
 /// "Adapting the sample size in particle filters through KLD-sampling", IJRR 22, 2003, eq. 7). 1 for fewer
-/// than two bins.
+/// than two bins; the largest number there is for what no number counts.
 [[nodiscard]] inline std::size_t kld_particle_count(std::size_t bins, double epsilon = 0.05,
                                                     double z = 2.326347874) {
   if (bins < 2) return 1;
   const double k = static_cast<double>(bins - 1);
   const double a = 2.0 / (9.0 * k);
-  const double root = 1.0 - a + std::sqrt(a) * z;
-  return static_cast<std::size_t>(std::ceil(k / (2.0 * epsilon) * root * root * root));
+  const double root = std::max(0.0, 1.0 - a + std::sqrt(a) * z);
+  const double count = std::ceil(k / (2.0 * epsilon) * root * root * root);
+  if (!(count < 0x1p63)) return std::numeric_limits<std::size_t>::max();
+  return static_cast<std::size_t>(std::max(1.0, count));
 }
 
 /// States with weights; weight i is exp(log_weights[i]) and they sum to 1 after every accepted step.
@@ -212,7 +214,9 @@ template <class X, class Bin>
 Status resample_by_kld(Particles<X>& belief, const KldSampling& options, const Bin& bin, Random& random) {
   if (belief.states.empty()) return Status::depleted;
   if (belief.log_weights.size() != belief.size()) return Status::size_mismatch;
-  if (!(options.epsilon > 0.0) || options.most < 1 || options.least > options.most) return Status::bad_option;
+  if (!(options.epsilon > 0.0) || !std::isfinite(options.z) || options.most < 1 ||
+      options.least > options.most)
+    return Status::bad_option;
   std::vector<double> sums = belief.weights();
   for (const double weight : sums)
     if (!(weight <= std::numeric_limits<double>::max())) return Status::not_finite;
@@ -318,14 +322,24 @@ struct ParticleFilter {
     return update_with(belief, log_likelihoods, random);
   }
 
-  /// The same with likelihoods of the user's own, one logarithm a particle.
+  /// The same with likelihoods of the user's own, one logarithm a particle. Where copying a state throws, the
+  /// particles are as before.
   template <class X>
   UpdateResult update_with(Particles<X>& belief, std::span<const double> log_likelihoods,
                            Random& random) const {
     if (belief.states.empty()) return Status::depleted;
     if (!valid()) return Status::bad_option;
+    struct Weights {  // put back where something is thrown
+      std::vector<double>& of;
+      std::vector<double> before;
+      bool keep = false;
+      ~Weights() {
+        if (!keep) of.swap(before);
+      }
+    } weights{belief.log_weights, belief.log_weights};
     const Status status = belief.reweigh(log_likelihoods);
     if (status == Status::accepted) resample_if_needed(belief, random);
+    weights.keep = true;
     return status;
   }
 
