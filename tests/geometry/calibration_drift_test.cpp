@@ -194,6 +194,27 @@ TEST_SUITE("calibration_drift") {
     CHECK(cairn_test::violation_of([&] { CalibrationDrift(rig, {.walk_baseline = 0}); }).empty());
   }
 
+  TEST_CASE("CalibrationDrift: few pairs that are wrong, or many that no rig explains, change nothing") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const StereoRig rig = cairn_test::rectified_rig();
+    CalibrationDrift drift(rig);
+    for (int k = 0; k < 50; ++k) drift.update(frame(rig, random));
+    const Vector<5> known = drift.state();
+    for (const std::size_t count : {std::size_t{1}, std::size_t{3}, std::size_t{19}, std::size_t{200}}) {
+      CAPTURE(count);
+      auto pairs = frame(rig, random, count);
+      for (PixelPair& pair : pairs)
+        pair.right(1) += (random.uniform() < 0.5 ? -1 : 1) * random.uniform(40, 90);
+      const CalibrationHealth health = drift.update(pairs);
+      CHECK(health.gated == count);
+      CHECK((drift.state() - known).norm() < 1e-9);
+      CHECK_FALSE(health.healthy);
+    }
+    CHECK(drift.update(frame(rig, random)).healthy);
+  }
+
   TEST_CASE("CalibrationDrift: frames without pairs or with impossible pixels are harmless") {
     const StereoRig rig = cairn_test::unrectified_rig();
     CalibrationDrift drift(rig);

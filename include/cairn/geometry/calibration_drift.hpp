@@ -55,7 +55,9 @@ struct CalibrationDriftOptions {
   double rate_sigma = 0;
   double rate_memory = 500;  ///< frames over which a rate is forgotten
   double pixel_sigma = 0.5;  ///< noise of a coordinate [pixels]
-  double gate = 3.5;         ///< matches whose innovation exceeds this many deviations are left out
+  /// Matches whose innovation exceeds this many deviations are left out; where most of at least twenty are,
+  /// and one rig explains them, the rig was knocked and its correction starts again.
+  double gate = 3.5;
   double unhealthy_distance =
       1.5;  ///< typical epipolar distance at which depth is not to be trusted [pixels]
 };
@@ -103,14 +105,15 @@ public:
   [[nodiscard]] Vector<3> rate() const { return part_of<3, 1>(state_, 5, 0); }
   [[nodiscard]] Matrix<3> rate_covariance() const { return part_of<3, 3>(covariance_, 5, 5); }
 
-  /// Takes the pairs of one frame. Pairs without rays are ignored. O(pairs).
+  /// Takes the pairs of one frame. Pairs without rays are ignored. Few pairs, or wrong ones, that the rig
+  /// does not explain are gated, and the health tells. O(pairs).
   CalibrationHealth update(std::span<const PixelPair> pairs) {
     const std::vector<Rays> rays = normalise(pairs);
     CalibrationHealth health;
     health.distance_before = typical_distance(rays);
     if (options_.enabled && !rays.empty()) {
       walk(1);
-      if (surprised(rays)) start_again(rays);
+      if (surprised(rays)) start_again(rays, health.distance_before);
       for (const Rays& pair : rays) (absorb(pair) ? health.used : health.gated) += 1;
       covariance_ = symmetrised(covariance_);
     }
@@ -260,8 +263,11 @@ private:
     return true;
   }
 
-  /// Whether most pairs fall out of the gate: the rig moved by more than the walk foresees.
+  /// Whether most pairs fall out of the gate, more of them than a few wrong ones: the rig moved by more than
+  /// the walk foresees.
   [[nodiscard]] bool surprised(const std::vector<Rays>& rays) const {
+    constexpr std::size_t enough = 20;  // of five numbers four times over
+    if (rays.size() < enough) return false;
     std::size_t outside = 0;
     for (const Rays& pair : rays) {
       const Innovation z = innovation(pair);
@@ -271,8 +277,11 @@ private:
   }
 
   /// Makes the covariance as wide as the residuals are, and leads the state into the basin of most pairs:
-  /// reweighted least squares (Cauchy) whose scale follows the median residual down.
-  void start_again(const std::vector<Rays>& rays) {
+  /// reweighted least squares (Cauchy) whose scale follows the median residual down. Nothing where it does
+  /// not come down to half of the `distance` there was: no rig explains them.
+  void start_again(const std::vector<Rays>& rays, double distance) {
+    const State known = state_;
+    const Covariance known_covariance = covariance_;
     const double focal = 0.5 * (correction_.nominal().left.fy() + correction_.nominal().right.fy());
     const double sigma = std::max(options_.initial_sigma, 2 * typical_distance(rays) / focal);
     covariance_ = initial(sigma, sigma);
@@ -291,6 +300,10 @@ private:
         gradient += (weight * z.value) * z.H;
       }
       state_ += Cholesky<numbers>(information).solve(gradient);
+    }
+    if (typical_distance(rays) > 0.5 * distance) {
+      state_ = known;
+      covariance_ = known_covariance;
     }
   }
 
