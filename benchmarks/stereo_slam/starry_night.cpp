@@ -43,7 +43,8 @@ struct Outcome {
   PathErrors estimate, dead_reckoning;
   double pose_nees = 0;      ///< mean over all frames, of 6
   double located_nees = 0;   ///< over those that were located
-  double landmark_nees = 0;  ///< mean over the dots at the end, of 3
+  double landmark_nees = 0;  ///< mean over the dots at the end, of 3: each alone
+  double map_nees = 0;       ///< of all dots at the end together, over their number, of 3
   double landmark_rmse = 0;  ///< [m]
   std::size_t landmarks = 0, frames = 0, located = 0, keyframes = 0, first = 0;
 };
@@ -79,6 +80,10 @@ public:
     p.cy = of("cv").numbers[0];
     rig.left = rig.right = cairn::PinholeCamera(p);
     rig.T_left_right = {{}, {of("b").numbers[0], 0, 0}};
+    // The noise that the record states. It is no pixel noise: held against the truth it is the same in both
+    // images (correlation 0.86 along u, 0.99 along v) and for all dots of a frame, as errors of the true pose
+    // would be; disparities vary by 11 square pixels, not by the 170 that follow from it. So poses, which are
+    // held against that truth, are as uncertain as it says, and dots are known better.
     sigma_ = std::sqrt(column<4>(of("y_var"), 0).mean());
   }
 
@@ -258,6 +263,8 @@ Outcome map_and_follow(const Record& record) {
   outcome.located_nees = located_nees.mean();
   outcome.keyframes = map.keyframe_count();
   cairn::RunningMoments squared, dot_nees;
+  std::vector<std::uint32_t> known_dots;
+  std::vector<double> errors;
   for (const std::uint32_t dot : map.landmark_ids()) {
     const auto known = map.landmark_in_world(dot);
     if (!known) continue;
@@ -265,6 +272,14 @@ Outcome map_and_follow(const Record& record) {
     const Vector<3> error = T_camera_truth * record.true_dot(dot) - known->mean;
     squared.add(error.squaredNorm());
     if (const auto one = cairn::normalised_squared(error, known->covariance)) dot_nees.add(*one);
+    known_dots.push_back(dot);
+    errors.insert(errors.end(), error.begin(), error.end());
+  }
+  if (const auto together = map.landmarks_in_world(known_dots)) {
+    const Vector<cairn::dynamic> error =
+        Eigen::Map<const Vector<cairn::dynamic>>(errors.data(), static_cast<Eigen::Index>(errors.size()));
+    if (const auto all = cairn::normalised_squared(error, together->covariance))
+      outcome.map_nees = *all / static_cast<double>(known_dots.size());
   }
   outcome.landmark_rmse = std::sqrt(squared.mean());
   outcome.landmark_nees = dot_nees.mean();
@@ -308,8 +323,8 @@ void add_starry_night_rows(cairn_bench::Scoreboard& board) {
     notes[1] = text(done->estimate.angle) + " for " + text(done->dead_reckoning.angle) + " rad RMSE";
     notes[2] = text(done->pose_nees) + " of 6, " + text(done->located_nees) + " where located; " +
                std::to_string(done->keyframes) + " keyframes";
-    notes[3] = text(done->landmark_nees) + " of 3; " + std::to_string(done->landmarks) +
-               " of 20 mapped, RMSE " + text(done->landmark_rmse) + " m";
+    notes[3] = text(done->map_nees) + " of 3 a dot, " + text(done->landmark_nees) + " each alone; " +
+               std::to_string(done->landmarks) + " of 20 mapped, RMSE " + text(done->landmark_rmse) + " m";
   }
   add({.name = "position better than dead reckoning",
        .unit = "times",

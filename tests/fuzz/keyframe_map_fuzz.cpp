@@ -33,9 +33,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     cairn_fuzz::expect(loaded(again.file("fuzzing ", 1)).landmark_count() == map.landmark_count(),
                        "a map that was loaded can be saved");
     for (const std::uint32_t id : map.landmark_ids())
-      if (const auto landmark = map.landmark_in_world(id))
-        cairn_fuzz::expect(cairn::all_finite(landmark->mean) && cairn::all_finite(landmark->covariance),
-                           "landmarks are finite");
+      for (const auto& landmark : {map.landmark(id), map.landmark_in_world(id)})
+        cairn_fuzz::expect(
+            !landmark || (cairn::all_finite(landmark->mean) && cairn::all_finite(landmark->covariance)),
+            "landmarks are finite");
   } catch (const cairn::Error&) {
     return cairn_fuzz::refused();
   }

@@ -182,9 +182,9 @@ TEST_SUITE("keyframe_map_file") {
       try {
         KeyframeMap map = map_of(other);
         for (const std::uint32_t id : map.landmark_ids()) {
-          const auto landmark = map.landmark_in_world(id);
-          REQUIRE(
-              (!landmark || (cairn::all_finite(landmark->mean) && cairn::all_finite(landmark->covariance))));
+          for (const auto& landmark : {map.landmark(id), map.landmark_in_world(id)})
+            REQUIRE((!landmark ||
+                     (cairn::all_finite(landmark->mean) && cairn::all_finite(landmark->covariance))));
         }
         static_cast<void>(map.locate(frames[11].T_world_camera, frames[11].sightings));
         ++works;

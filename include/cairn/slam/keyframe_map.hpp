@@ -158,31 +158,61 @@ public:
 
   /// Position given the keyframes, with the covariance it had if those were known: what a pose is to be
   /// estimated from. Nothing for a landmark that is not there, or whose sightings contradict each other under
-  /// the keyframes as they now stand (it is then forgotten).
+  /// the keyframes as they now stand (it is then forgotten), or is more than numbers hold, which a file's
+  /// numbers can make it.
   [[nodiscard]] std::optional<Gaussian<Vector<3>>> landmark(std::uint32_t id) {
-    detail::KeyframeLandmark* const found = fresh(id);
-    if (found == nullptr) return std::nullopt;
+    const detail::KeyframeLandmark* const found = fresh(id);
+    if (found == nullptr || !all_finite(found->x) || !all_finite(found->S)) return std::nullopt;
     return Gaussian<Vector<3>>{found->x, found->S};
   }
-  /// The same with the keyframes' uncertainty: how well the landmark is known in the world. Nothing where
-  /// that is more than numbers hold, which a file's numbers can make it.
+  /// The same with the uncertainty of the keyframes, and of the rig where it is estimated: how well the
+  /// landmark is known in the world.
   [[nodiscard]] std::optional<Gaussian<Vector<3>>> landmark_in_world(std::uint32_t id) {
-    const detail::KeyframeLandmark* const found = fresh(id);
-    if (found == nullptr) return std::nullopt;
-    Matrix<3> P = found->S;
-    for (std::size_t a = 0; a < found->count; ++a)
-      for (std::size_t b = 0; b < found->count; ++b) {
-        const Matrix<6> cross = poses_.cross_covariance(block_of(*found, a), block_of(*found, b));
-        Matrix<3, 6> half;  // G cross
-        for (int c = 0; c < 6; ++c) put(half, 0, c, moved_with_world(found->x, &cross(0, c)));
-        const Matrix<6, 3> turned = transposed(half);
-        Matrix<3> both;  // G cross G^T, transposed
-        for (int c = 0; c < 3; ++c) put(both, 0, c, moved_with_world(found->x, &turned(0, c)));
-        P += product_transposed(product(found->F[a], transposed(both)), found->F[b]);
-      }
-    const Matrix<3> covariance = pose_factor_ * symmetrised(P);
-    if (!all_finite(found->x) || !all_finite(covariance)) return std::nullopt;
-    return Gaussian<Vector<3>>{found->x, covariance};
+    const auto one = landmarks_in_world({&id, 1});
+    if (!one) return std::nullopt;
+    return Gaussian<Vector<3>>{one->mean, one->covariance};
+  }
+  /// Several together, three numbers each in the order of `ids`, with the errors that they share because the
+  /// same keyframes saw them: what a test of the whole map needs. Nothing where one of them is not known.
+  /// O((18 n + 36 k) k) for n landmarks that k keyframes saw.
+  [[nodiscard]] std::optional<Gaussian<Vector<dynamic>>> landmarks_in_world(
+      std::span<const std::uint32_t> ids) {
+    for (const std::uint32_t id : ids)  // those that contradict themselves leave, and move others
+      if (fresh(id) == nullptr) return std::nullopt;
+    std::vector<AnyBlockId> blocks;
+    std::unordered_map<std::uint32_t, Eigen::Index> column;  // of a keyframe
+    for (const std::uint32_t id : ids) {
+      const detail::KeyframeLandmark& one = landmarks_[place_.at(id)];
+      for (std::size_t i = 0; i < one.count; ++i)
+        if (column.try_emplace(one.sightings[i].keyframe, 6 * static_cast<Eigen::Index>(column.size()))
+                .second)
+          blocks.push_back(block_of(one, i));
+    }
+    const auto n = static_cast<Eigen::Index>(ids.size());
+    const Eigen::Index of_keyframes = 6 * static_cast<Eigen::Index>(column.size());
+    const Eigen::Index of_rig = with_rig() && n > 0 ? rig_numbers : 0;
+    if (of_rig > 0) blocks.push_back(rig_block_);
+
+    Gaussian<Vector<dynamic>> all{Vector<dynamic>(3 * n), {}};
+    Matrix<dynamic, dynamic> J = Matrix<dynamic, dynamic>::Zero(3 * n, of_keyframes + of_rig);
+    for (Eigen::Index place = 0; place < n; ++place) {
+      const detail::KeyframeLandmark& one = landmarks_[place_.at(ids[static_cast<std::size_t>(place)])];
+      all.mean.template segment<3>(3 * place) = one.x;
+      Matrix<3, 6> G;  // a step of the world, at the landmark
+      G << Matrix<3>::Identity(), -skew(one.x);
+      for (std::size_t i = 0; i < one.count; ++i)
+        J.template block<3, 6>(3 * place, column.at(one.sightings[i].keyframe)) += one.F[i] * G;
+      if (of_rig > 0) J.block(3 * place, of_keyframes, 3, of_rig) = one.B;
+    }
+    const Matrix<dynamic, dynamic> half = J * poses_.covariance(blocks);
+    Matrix<dynamic, dynamic> P = half * J.transpose();
+    for (Eigen::Index a = 0; a < n; ++a)  // the noise of its own, which one that is named twice has but once
+      for (Eigen::Index b = 0; b < n; ++b)
+        if (const std::uint32_t id = ids[static_cast<std::size_t>(a)]; id == ids[static_cast<std::size_t>(b)])
+          P.template block<3, 3>(3 * a, 3 * b) += landmarks_[place_.at(id)].S;
+    all.covariance = pose_factor_ * symmetrised(P);
+    if (!all_finite(all.mean) || !all_finite(all.covariance)) return std::nullopt;
+    return all;
   }
   /// All that a landmark follows from, by keyframes: with keyframe_pose(), the data of the joint least
   /// squares problem whose solution the map approximates. Empty for a landmark that is not there.
@@ -284,8 +314,11 @@ public:
     const auto found = place_.find(landmark);
     if (found == place_.end()) return false;
     const std::size_t place = found->second;
-    for (std::size_t i = 0; i < landmarks_[place].count; ++i)
-      --keyframes_[landmarks_[place].sightings[i].keyframe].sightings;
+    for (std::size_t i = 0; i < landmarks_[place].count; ++i) {
+      Keyframe& keyframe = keyframes_[landmarks_[place].sightings[i].keyframe];
+      --keyframe.sightings;
+      std::erase(keyframe.saw, landmark);  // its number may become another's
+    }
     place_.erase(found);
     if (place + 1 != landmarks_.size()) {
       landmarks_[place] = landmarks_.back();
@@ -360,7 +393,7 @@ private:
   struct Keyframe {
     BlockId<WorldPose> block;
     std::size_t sightings = 0;       // in lists
-    std::vector<std::uint32_t> saw;  // landmarks, some of which may be gone
+    std::vector<std::uint32_t> saw;  // landmarks
     std::optional<detail::RigView> view;
     std::uint64_t epoch = 0;
   };
@@ -375,10 +408,13 @@ private:
         options.sightings_a_visit < 1)
       return "KeyframeMap: a list has one to six sightings, and one a visit at least";
     if (options.max_keyframes < 4) return "KeyframeMap: expected room for four keyframes";
-    if (!(options.rig.each().minCoeff() >= 0) || !all_finite(options.rig.each()))
-      return "KeyframeMap: a rig's sigmas are finite and not negative";
-    if (!(options.loss_scale > 0 && options.first_sigma > 0) || options.min_matches < 3)
-      return "KeyframeMap: scales and sigmas are positive, and a pose needs three matches";
+    constexpr double most_sigma = 1e9, least_sigma = 1e-150;  // their squares are numbers
+    if (!(options.rig.each().minCoeff() >= 0) || !(options.rig.each().maxCoeff() <= most_sigma))
+      return "KeyframeMap: a rig's sigmas are not negative, and within 1e9";
+    if (!(options.loss_scale > 0) || options.min_matches < 3)
+      return "KeyframeMap: the loss has a scale, and a pose needs three matches";
+    if (!(options.first_sigma >= least_sigma && options.first_sigma <= most_sigma))
+      return "KeyframeMap: the first keyframe's sigma is positive, and within 1e9";
     const auto is_share = [](double p) { return p > 0 && p < 1; };
     if (!is_share(options.gate_probability) || !is_share(options.contradiction))
       return "KeyframeMap: probabilities lie between 0 and 1";
