@@ -150,6 +150,19 @@ TEST_SUITE("scan/occupancy_grid") {
           std::string::npos);
     CHECK(grid.empty());
     CHECK(grid.cells().tile({0, 0}) == nullptr);
+
+    // Also where only the last of its points makes the map too wide.
+    grid.insert(SE2(), {{1, 0}});
+    const double edge = grid.geometry().cell_size * 32 * 65536 - 2;
+    std::size_t before = 0, after = 0;
+    grid.cells().for_each_tile([&](cairn::TileAddress, const auto&) { ++before; });
+    CHECK(cairn_test::message_of([&] {
+            grid.insert(SE2(edge, 0, 0), {{-1, 0}, {1, 0}, {10, 0}});
+          }).find("65536 tiles") != std::string::npos);
+    grid.cells().for_each_tile([&](cairn::TileAddress, const auto&) { ++after; });
+    CHECK(before == after);
+    grid.insert(SE2(edge, 0, 0), {{-1, 0}, {1, 0}});
+    CHECK(grid.cells().read(grid.geometry().cell_of(edge + 1, 0)).hits == 1);
   }
 
   TEST_CASE("occupancy_grid: a bad cell size and points without a cell are refused in words") {

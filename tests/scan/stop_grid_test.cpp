@@ -191,6 +191,32 @@ TEST_SUITE("scan/stop_grid") {
     CHECK(cairn_test::message_of([&] { grid.insert(beam(1), SE2(1e12, 0, 0)); }).find("2^28") !=
           std::string::npos);
   }
+
+  TEST_CASE_TEMPLATE(
+      "stop_grid: a scan of which one beam ends outside is refused, and the grid stays as it was", Storage,
+      SharedTiles<StopCell>, Ancestry<StopCell>) {
+    StopGrid<Storage> grid;
+    grid.insert(beam(2), SE2());
+    const double cell = grid.options().geometry.cell_size;
+    const auto lengths = [&] {
+      double sum = 0;
+      grid.cells().for_each_tile([&](TileAddress, const auto& tile) {
+        for (const StopCell& each : tile) sum += each.length + each.stops;
+      });
+      return sum;
+    };
+    const double before = lengths();
+    LaserScan two = beam(2, 40);
+    two.angle_step = 0.01;
+    two.range.push_back(10);
+    for (const double edge :
+         {cell * double(1 << 28) - 5, cell * 32 * 65536 - 5}) {  // of all cells, of the map
+      CHECK_FALSE(cairn_test::message_of([&] { grid.insert(two, SE2(edge, 0, 0)); }).empty());
+      CHECK(lengths() == before);
+    }
+    grid.insert(two, SE2(cell * 32 * 65536 - 15, 0, 0));
+    CHECK(lengths() > before + 11);
+  }
 }
 
 }  // namespace stop_grid_test

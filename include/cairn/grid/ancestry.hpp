@@ -123,6 +123,10 @@ public:
     });
   }
 
+  /// Throws Error where the tree could not hold the rectangle of these tiles as well: to be asked before the
+  /// first of many writes.
+  void expect_room(TileAddress low, TileAddress high) const { tree_->cells().expect_room(low, high); }
+
   /// Held while one thread changes a grid of the tree and others may change another.
   [[nodiscard]] std::unique_lock<std::mutex> guard() const { return std::unique_lock(tree_->mutex); }
 

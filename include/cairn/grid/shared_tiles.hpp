@@ -61,6 +61,10 @@ public:
     return root.blocks[root.place(address)].own()[place_in_block(address)].own();
   }
 
+  /// Throws Error as write() does where the grid could not hold the rectangle of these tiles as well: to be
+  /// asked before the first of many writes.
+  void expect_room(TileAddress low, TileAddress high) const { static_cast<void>(widened(low, high)); }
+
   /// Reads many cells, neighbours soonest: two loads and a comparison are spared within a tile. Lives no
   /// longer than the grid, and only until it is changed.
   class Reader {
@@ -149,19 +153,23 @@ private:
     return static_cast<std::size_t>((tile.row & 15) * block_side + (tile.column & 15));
   }
 
-  void grow(TileAddress address) {
+  /// The rectangle of blocks, without any, that holds those there are and these tiles.
+  [[nodiscard]] Root widened(TileAddress low, TileAddress high) const {
     constexpr std::int32_t most = 1 << 12;  // blocks a side
-    const std::int32_t c = address.column >> 4, r = address.row >> 4;
-    Root next{c, r, 1, 1, {}};
+    std::int32_t left = low.column >> 4, top = low.row >> 4, right = high.column >> 4, bottom = high.row >> 4;
     if (const Root* old = root_.get()) {
-      next.column = std::min(c, old->column);
-      next.row = std::min(r, old->row);
-      next.columns = std::max(c + 1, old->column + old->columns) - next.column;
-      next.rows = std::max(r + 1, old->row + old->rows) - next.row;
+      left = std::min(left, old->column);
+      top = std::min(top, old->row);
+      right = std::max(right, old->column + old->columns - 1);
+      bottom = std::max(bottom, old->row + old->rows - 1);
     }
-    if (next.columns > most || next.rows > most)
+    if (right - left >= most || bottom - top >= most)
       raise("SharedTiles: expected cells within a square of 65536 tiles, found tile " +
-            std::to_string(address.column) + ", " + std::to_string(address.row) + " outside of it");
+            std::to_string(high.column) + ", " + std::to_string(high.row) + " outside of it");
+    return {left, top, right - left + 1, bottom - top + 1, {}};
+  }
+  void grow(TileAddress address) {
+    Root next = widened(address, address);
     next.blocks.resize(static_cast<std::size_t>(next.columns) * static_cast<std::size_t>(next.rows));
     if (const Root* old = root_.get())
       for (std::int32_t row = 0; row < old->rows; ++row)

@@ -105,7 +105,7 @@ public:
 
   /// Takes in the end points of a scan made at `pose`: a hit in each cell with a point, free what lies
   /// between the scanner and the points. O(cells that the beams pass). Throws Error where the map would
-  /// become too wide.
+  /// become too wide, and is as it was.
   void insert(const SE2& pose, const std::vector<ScanPoint>& points) {
     thread_local Marks marks;  // whose memory serves scan after scan
     const std::vector<Point> ends = placed(pose, points);
@@ -113,6 +113,7 @@ public:
     marks.begin(at(pose.x(), pose.y()), ends);
     for (const Point& end : ends) marks.ray(end);
     for (const Point& end : ends) marks.hit(end);
+    marks.expect_room(cells_);
     marks.for_each_tile([&](TileAddress tile, const auto& visit_cells) {
       auto& out = cells_.writable_tile(tile);
       visit_cells([&](std::size_t place, bool stopped) {
@@ -188,6 +189,11 @@ private:
     void hit(const Point& end) {
       tile(end.cell).passed[static_cast<std::size_t>(end.cell.row & 31)] |= bit(end.cell);
       tile(end.cell).stopped[static_cast<std::size_t>(end.cell.row & 31)] |= bit(end.cell);
+    }
+
+    /// Throws Error where they do not fit into `cells`.
+    void expect_room(const SharedTiles<OccupancyCell>& cells) const {
+      cells.expect_room(first_, {first_.column + columns_ - 1, first_.row + rows_ - 1});
     }
 
     /// visit(tile, cells) with cells(f) calling f(place in the tile, whether stopped), for every tile with a

@@ -144,34 +144,65 @@ public:
     return prepared().log_likelihood(scan, pose);
   }
 
-  /// Takes a scan in: a stop in each hit's cell, and the lengths of all beams.
+  /// Takes a scan in: a stop in each hit's cell, and the lengths of all beams. Throws Error where a beam ends
+  /// too far away or the map would become too wide, and is as it was.
   void insert(const LaserScan& scan, const SE2& pose) {
     [[maybe_unused]] const auto guard = guarded();
+    expect_room(scan, pose);
     auto write = cells_.writer();
     for (std::size_t i = 0; i < scan.size(); ++i) {
       const BeamKind kind = scan.kind(i);
       if (kind == BeamKind::invalid) continue;
-      const bool hit = kind == BeamKind::hit;
-      const double end = hit ? static_cast<double>(scan.range[i]) : scan.farthest;
       CellAddress last;
-      walk(pose.x(), pose.y(), pose.angle() + scan.angle(i), end,
+      walk(pose.x(), pose.y(), pose.angle() + scan.angle(i), length_of(scan, i),
            [&](CellAddress cell, double, double chord) {
              write(cell).length += static_cast<float>(chord);
              last = cell;
            });
-      if (hit) write(last).stops += 1;
+      if (kind == BeamKind::hit) write(last).stops += 1;
     }
   }
 
 private:
+  struct Place {
+    double x, y;
+  };
+  /// Where a beam that starts at (x, y) ends.
+  [[nodiscard]] Place end_of(double x, double y, double angle, double end) const {
+    const Place to{x + end * std::cos(angle), y + end * std::sin(angle)};
+    if (!options_.geometry.contains(x, y) || !options_.geometry.contains(to.x, to.y))
+      raise("StopGrid: expected beams less than 2^28 cells from the origin");
+    return to;
+  }
+  /// How far the beam went that a scan's reading says something of.
+  [[nodiscard]] static double length_of(const LaserScan& scan, std::size_t i) {
+    return scan.kind(i) == BeamKind::hit ? static_cast<double>(scan.range[i]) : scan.farthest;
+  }
+  void expect_room(const LaserScan& scan, const SE2& pose) const {
+    const GridGeometry& g = options_.geometry;
+    bool any = false;
+    CellAddress low, high;
+    const auto widen = [&](double x, double y) {
+      const CellAddress cell = g.cell_of(x, y);
+      low = any ? CellAddress{std::min(low.column, cell.column), std::min(low.row, cell.row)} : cell;
+      high = any ? CellAddress{std::max(high.column, cell.column), std::max(high.row, cell.row)} : cell;
+      any = true;
+    };
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+      if (scan.kind(i) == BeamKind::invalid) continue;
+      const Place end = end_of(pose.x(), pose.y(), pose.angle() + scan.angle(i), length_of(scan, i));
+      if (!any) widen(pose.x(), pose.y());
+      widen(end.x, end.y);
+    }
+    if (any) cells_.expect_room(tile_of(low), tile_of(high));
+  }
+
   template <class Visit>
   void walk(double x, double y, double angle, double end, Visit&& visit) const {
     const GridGeometry& g = options_.geometry;
-    const double to_x = x + end * std::cos(angle), to_y = y + end * std::sin(angle);
-    if (!g.contains(x, y) || !g.contains(to_x, to_y))
-      raise("StopGrid: expected beams less than 2^28 cells from the origin");
+    const Place to = end_of(x, y, angle, end);
     double from = 0;
-    walk_ray(g.column_of(x), g.row_of(y), g.column_of(to_x), g.row_of(to_y),
+    walk_ray(g.column_of(x), g.row_of(y), g.column_of(to.x), g.row_of(to.y),
              [&](CellAddress cell, double length) {
                const double chord = length * g.cell_size;
                visit(cell, from, chord);
