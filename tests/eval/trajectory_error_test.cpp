@@ -1,8 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -14,7 +16,9 @@
 #include <cairn/io/trajectory.hpp>
 
 #include "support/data.hpp"
+#include "support/folder.hpp"
 #include "support/random.hpp"
+#include "support/violation.hpp"
 
 using cairn::AlignBy;
 using cairn::PosePair;
@@ -196,6 +200,34 @@ TEST_SUITE("trajectory_error") {
     CHECK(cairn::associate(good, good, {.offset = nan}).empty());
     CHECK(cairn::associate(good, good, {.largest_difference = nan}).empty());
     CHECK(cairn::associate(good, good).size() == 2);
+    // One among others hides none of them.
+    const Trajectory long_one{{nan, SE3()}, {0.0, SE3()}, {1.0, SE3()},
+                              {nan, SE3()}, {2.0, SE3()}, {3.0, SE3()}};
+    const auto pairs =
+        cairn::associate(long_one, Trajectory{{0.0, SE3()}, {2.0, SE3()}, {nan, SE3()}, {3.0, SE3()}});
+    REQUIRE(pairs.size() == 3);
+    for (std::size_t i = 0; i < 3; ++i) CHECK(pairs[i].time == std::array{0.0, 2.0, 3.0}[i]);
+    const Trajectory back{{1.0, SE3()}, {nan, SE3()}, {0.0, SE3()}};
+    CHECK_FALSE(cairn_test::violation_of([&] { static_cast<void>(cairn::associate(back, good)); }).empty());
+  }
+
+  TEST_CASE(
+      "trajectory_error: poses that are not finite are refused by name, an endless delta has no pairs") {
+    const double infinity = std::numeric_limits<double>::infinity();
+    std::vector<cairn::PosePair> pairs(4);
+    for (int i = 0; i < 4; ++i)
+      pairs[static_cast<std::size_t>(i)] = {double(i), SE3(cairn::SO3(), cairn::Vector<3>(i, 0, 0)),
+                                            SE3(cairn::SO3(), cairn::Vector<3>(2 * i, 0, 0))};
+    for (const bool all_pairs : {false, true})
+      for (const auto unit : {cairn::DeltaUnit::frames, cairn::DeltaUnit::metres})
+        CHECK_FALSE(cairn::relative_error(pairs, {.delta = infinity, .unit = unit, .all_pairs = all_pairs}));
+    pairs[2].estimate = SE3(cairn::SO3(), cairn::Vector<3>(std::nan(""), 0, 0));
+    for (const auto by : {cairn::AlignBy::none, cairn::AlignBy::first_pose, cairn::AlignBy::rigid})
+      CHECK(cairn_test::message_of([&] {
+              static_cast<void>(cairn::absolute_error(pairs, by));
+            }).find("pair 2") != std::string::npos);
+    CHECK(cairn_test::message_of([&] { static_cast<void>(cairn::relative_error(pairs)); }).find("pair 2") !=
+          std::string::npos);
   }
 
   TEST_CASE("associate: the earlier of two equally near, the first of two that want the same") {

@@ -8,7 +8,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <cairn/core/check.hpp>
@@ -36,25 +38,33 @@ struct AssociationOptions {
 /// O((n + m) log m).
 [[nodiscard]] inline std::vector<PosePair> associate(const Trajectory& truth, const Trajectory& estimate,
                                                      const AssociationOptions& options = {}) {
-  const auto before = [](const StampedPose& a, const StampedPose& b) { return a.time < b.time; };
-  CAIRN_EXPECTS(std::is_sorted(truth.begin(), truth.end(), before) &&
-                    std::is_sorted(estimate.begin(), estimate.end(), before),
-                "associate needs trajectories in the order of time");
+  std::vector<const StampedPose*> timed;  // of the truth
+  timed.reserve(truth.size());
+  for (const StampedPose& pose : truth)
+    if (!std::isnan(pose.time)) timed.push_back(&pose);
+  const auto rises = [last = -std::numeric_limits<double>::infinity()](const StampedPose& pose) mutable {
+    if (std::isnan(pose.time)) return true;
+    return pose.time >= std::exchange(last, pose.time);
+  };
+  CAIRN_EXPECTS(
+      std::all_of(truth.begin(), truth.end(), rises) && std::all_of(estimate.begin(), estimate.end(), rises),
+      "associate needs trajectories in the order of time");
   std::vector<PosePair> pairs;
-  if (truth.empty()) return pairs;
-  std::size_t taken = truth.size();  // the truth index of the last pair
+  if (timed.empty()) return pairs;
+  std::size_t taken = timed.size();  // the place of the last pair's truth
   double taken_difference = 0;
   for (const StampedPose& pose : estimate) {
     const double time = pose.time + options.offset;
-    auto nearest = std::lower_bound(truth.begin(), truth.end(), time,
-                                    [](const StampedPose& a, double t) { return a.time < t; });
-    if (nearest == truth.end() ||
-        (nearest != truth.begin() && time - (nearest - 1)->time <= nearest->time - time))
+    if (std::isnan(time)) continue;
+    auto nearest = std::lower_bound(timed.begin(), timed.end(), time,
+                                    [](const StampedPose* a, double t) { return a->time < t; });
+    if (nearest == timed.end() ||
+        (nearest != timed.begin() && time - (*(nearest - 1))->time <= (*nearest)->time - time))
       --nearest;
-    const double difference = std::abs(nearest->time - time);
-    if (!(difference <= options.largest_difference)) continue;  // also where a time is none
-    const auto index = static_cast<std::size_t>(nearest - truth.begin());
-    const PosePair pair{pose.time, nearest->T_world_body, pose.T_world_body};
+    const double difference = std::abs((*nearest)->time - time);
+    if (!(difference <= options.largest_difference)) continue;
+    const auto index = static_cast<std::size_t>(nearest - timed.begin());
+    const PosePair pair{pose.time, (*nearest)->T_world_body, pose.T_world_body};
     if (index != taken)
       pairs.push_back(pair);
     else if (difference < taken_difference)

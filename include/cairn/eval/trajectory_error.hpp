@@ -17,6 +17,7 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -80,6 +81,12 @@ struct AbsoluteError {
 
 namespace detail {
 
+inline void expect_finite(std::span<const PosePair> pairs, const char* who) {
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    if (!all_finite(pairs[i].truth.matrix()) || !all_finite(pairs[i].estimate.matrix()))
+      raise(std::string(who) + ": expected finite poses, pair " + std::to_string(i) + " has others");
+}
+
 /// T_align and scale of (1); nothing where the positions do not determine them.
 inline std::optional<std::pair<SE3, double>> alignment_of(std::span<const PosePair> pairs, AlignBy by) {
   if (by == AlignBy::none) return std::pair(SE3(), 1.0);
@@ -100,10 +107,11 @@ inline std::optional<std::pair<SE3, double>> alignment_of(std::span<const PosePa
 
 /// Absolute error (1), or nothing when there are no pairs, or all positions are the same and by asks for a
 /// fit to them. A path along a straight line is aligned with the rotation about the line left as it falls:
-/// distances are right, attitudes are not. O(n).
+/// distances are right, attitudes are not. Throws Error naming a pair with a pose that is not finite. O(n).
 [[nodiscard]] inline std::optional<AbsoluteError> absolute_error(std::span<const PosePair> pairs,
                                                                  AlignBy by = AlignBy::rigid) {
   if (pairs.empty()) return std::nullopt;
+  detail::expect_finite(pairs, "absolute_error");
   const auto alignment = detail::alignment_of(pairs, by);
   if (!alignment) return std::nullopt;
   AbsoluteError result;
@@ -174,11 +182,14 @@ inline std::vector<std::pair<std::size_t, std::size_t>> relative_pairs(std::span
 
 }  // namespace detail
 
-/// Relative error (2) over pairs in the order of time, or nothing when no two are delta apart. O(n log n).
+/// Relative error (2) over pairs in the order of time, or nothing when no two are delta apart. Throws Error
+/// naming a pair with a pose that is not finite. O(n log n).
 [[nodiscard]] inline std::optional<RelativeError> relative_error(std::span<const PosePair> pairs,
                                                                  const RelativeOptions& options = {}) {
   CAIRN_EXPECTS(options.delta > 0.0 && (options.unit == DeltaUnit::metres || options.delta >= 1.0),
                 "relative_error needs a positive distance, of at least one frame");
+  detail::expect_finite(pairs, "relative_error");
+  if (!std::isfinite(options.delta)) return std::nullopt;
   std::vector<double> translations, rotations;
   for (const auto& [i, j] : detail::relative_pairs(pairs, options)) {
     const SE3 E = (pairs[i].truth.inverse() * pairs[j].truth).inverse() *
