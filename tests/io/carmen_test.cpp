@@ -105,6 +105,11 @@ TEST_SUITE("io/carmen") {
     CHECK(words_of("FLASER 1 1 0 1e300 0 0 0 0 1 h 0\n")
               .find("the laser's pose: metres within 1e9 ('1e300' is none)") != std::string::npos);
     CHECK(words_of("FLASER\n").find("number of ranges") != std::string::npos);
+    // A count that is not the line's: what is left over were ranges.
+    CHECK(words_of("FLASER 1 1 2 3 0 0 0 0 0 0 1 h 0\n").find("log:1: expected after the time") !=
+          std::string::npos);
+    CHECK(words_of("FLASER 0 1 2 3 0 0 0 0 0 0 1 h 0\n").find("log:1: ") != std::string::npos);
+    CHECK(words_of("ODOM 0 0 0 0 0 0 1 h 0 9\n").find("log:1: ") != std::string::npos);
     const cairn_test::Folder folder;
     CHECK_FALSE(cairn_test::message_of([&] { static_cast<void>(read_carmen(folder / "none")); }).empty());
   }
@@ -138,6 +143,12 @@ TEST_SUITE("io/carmen") {
                               odometry(0, 1) + odometry(2, 2) + raw + "1.25 h 0\n" + raw + "1.5 h 0\n");
     place_by_odometry(unplaced, "log");
     REQUIRE(unplaced.scans.size() == 2);
+    CarmenLog alone = read(odometry(0, 1) + raw + "1.5 h 0\n" + odometry(2, 2));  // one scan moves as well
+    place_by_odometry(alone, "log");
+    CHECK(alone.scans[0].T_odom_robot.x() == doctest::Approx(1));
+    CarmenLog at_home = read(raw + "1.5 h 0\n");
+    place_by_odometry(at_home, "log");
+    CHECK(at_home.scans[0].T_odom_robot.x() == 0);
     CHECK(unplaced.scans[0].scan.first_angle == -1);
     CHECK(unplaced.scans[0].scan.kind(2) == BeamKind::no_return);
     CHECK(unplaced.scans[1].T_odom_robot.x() == doctest::Approx(1));

@@ -100,14 +100,25 @@ public:
   }
 
   SE2 pose(const char* what) {
-    const auto length = [&] {
-      const std::string_view field = next();
-      const double value = number(what);
-      if (!(std::abs(value) <= farthest_odometry)) refuse(what, "metres within 1e9", field);
-      return value;
-    };
-    const double x = length(), y = length(), theta = number(what);
+    const double x = metres(what), y = metres(what), theta = number(what);
     return {x, y, theta};
+  }
+
+  double metres(const char* what) {
+    const std::string_view field = next();
+    const double value = number(what);
+    if (!(std::abs(value) <= farthest_odometry)) refuse(what, "metres within 1e9", field);
+    return value;
+  }
+
+  /// The time, after which a line has two fields at most: the host's name and the logger's time. More than
+  /// those are of a count of ranges that is not the line's.
+  double last_time() {
+    const double time = number("the time");
+    take();
+    take();
+    if (!next().empty()) refuse("after the time", "a host's name and the logger's time at most", rest_);
+    return time;
   }
 
   void ranges(std::vector<float>& out, std::size_t count) {
@@ -150,7 +161,7 @@ inline StampedScan front_laser(CarmenFields fields, double farthest) {
   set_half_turn(s.scan);
   s.T_odom_laser = fields.pose("the laser's pose");
   s.T_odom_robot = fields.pose("the robot's pose");
-  s.time = fields.number("the time");
+  s.time = fields.last_time();
   return s;
 }
 
@@ -178,7 +189,7 @@ inline StampedScan robot_laser(CarmenFields fields, double farthest) {
   for (const char* what :
        {"the velocity", "the turn rate", "the forward distance", "the side distance", "the turning axis"})
     fields.number(what);
-  s.time = fields.number("the time");
+  s.time = fields.last_time();
   return s;
 }
 
@@ -187,7 +198,7 @@ inline StampedScan raw_laser(CarmenFields fields, double farthest, double ahead)
   StampedScan s;
   s.scan = described_scan(fields, farthest);
   s.T_odom_laser = SE2(ahead, 0, 0);
-  s.time = fields.number("the time");
+  s.time = fields.last_time();
   return s;
 }
 
@@ -195,7 +206,7 @@ inline StampedOdometry odometry(CarmenFields fields) {
   StampedOdometry o;
   o.T_odom_robot = fields.pose("the robot's pose");
   for (const char* what : {"the velocity", "the turn rate", "the acceleration"}) fields.number(what);
-  o.time = fields.number("the time");
+  o.time = fields.last_time();
   return o;
 }
 
@@ -237,7 +248,7 @@ inline StampedScan dp_slam_laser(CarmenFields fields, const TextLines& lines,
       raw.push_back(detail::raw_laser(detail::CarmenFields(lines), farthest, ahead));
     else if (kind == "PARAM") {
       detail::CarmenFields fields(lines);
-      if (fields.take() == "robot_frontlaser_offset") ahead = fields.number("the laser's offset");
+      if (fields.take() == "robot_frontlaser_offset") ahead = fields.metres("the laser's offset");
     } else if (kind == "ODOM")
       log.odometry.push_back(detail::odometry(detail::CarmenFields(lines)));
     else if (kind == "Odometry")
@@ -256,18 +267,17 @@ inline StampedScan dp_slam_laser(CarmenFields fields, const TextLines& lines,
 /// lines move (RAWLASER1, logs of CARMEN without a localisation): the newest one before it by time, moved on
 /// between neighbours in proportion. Throws Error where there is neither.
 inline void place_by_odometry(CarmenLog& log, const std::string& name) {
+  const auto at_start = [](const SE2& pose) { return local(SE2(), pose).isZero(0); };  // as a raw scan's is
   const auto moves = [](const auto& list, auto pose) {
     return std::ranges::any_of(list, [&](const auto& each) {
       return local(pose(list.front()), pose(each)).cwiseAbs().maxCoeff() > 1e-6;
     });
   };
-  if (log.scans.size() < 2 || moves(log.scans, [](const auto& s) { return s.T_odom_robot; })) return;
-  if (log.odometry.empty() || !moves(log.odometry, [](const auto& o) { return o.T_odom_robot; })) {
-    if (log.odometry.empty())
-      raise(name +
-            ": expected scans with odometry, found scans that all carry the same pose and no ODOM line");
-    return;
-  }
+  if (log.scans.empty() || moves(log.scans, [](const auto& s) { return s.T_odom_robot; })) return;
+  if (log.scans.size() == 1 && (log.odometry.empty() || !at_start(log.scans[0].T_odom_robot))) return;
+  if (log.odometry.empty())
+    raise(name + ": expected scans with odometry, found scans that all carry the same pose and no ODOM line");
+  if (log.scans.size() > 1 && !moves(log.odometry, [](const auto& o) { return o.T_odom_robot; })) return;
   std::multimap<double, SE2> by_time;  // the log's times may run back; what shares one stays in its order
   for (const StampedOdometry& each : log.odometry)
     by_time.emplace_hint(by_time.end(), each.time, each.T_odom_robot);
