@@ -630,6 +630,32 @@ TEST_SUITE("descriptor_index") {
     CHECK(found[1].distance == doctest::Approx(0.1));
   }
 
+  TEST_CASE("small cells in few dimensions: whole blocks of cells are taken, and the answers are exact") {
+    cairn::Random random(cairn_test::seed());
+    std::vector<std::array<float, 3>> points(600);
+    const auto any = [&] {
+      std::array<float, 3> p{};
+      for (float& v : p) v = static_cast<float>(random.uniform());
+      return p;
+    };
+    for (auto& p : points) p = any();
+    const cairn::DescriptorIndex<std::vector<std::array<float, 3>>> index(points, {.points_in_cell = 2});
+    for (int k = 0; k < 50; ++k) {
+      const auto query = any();
+      std::vector<float> squares;
+      for (const auto& p : points) {
+        float sum = 0;
+        for (std::size_t i = 0; i < 3; ++i) sum += (p[i] - query[i]) * (p[i] - query[i]);
+        squares.push_back(sum);
+      }
+      std::ranges::sort(squares);
+      const auto found = index.nearest(query, 40);
+      REQUIRE(found.size() == 40);
+      for (std::size_t i = 0; i < 40; ++i)
+        CHECK(found[i].distance == doctest::Approx(std::sqrt(squares[i])).epsilon(1e-5));
+    }
+  }
+
   TEST_CASE("nothing in it, and bad input") {
     using cairn_test::message_of;
     const std::vector<std::array<float, 2>> none;

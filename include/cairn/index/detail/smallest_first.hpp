@@ -144,7 +144,8 @@ private:
       for (std::size_t j = begin; j < std::min(begin + block_size, sorted_count_); ++j) {
         const Block<std::int32_t> later =
             numbers > Block<std::int32_t>{} + static_cast<std::int32_t>(j - begin);
-        ranks -= Block<std::int32_t>{} + taken_keys_[j] < keys - later;
+        const Block<std::int32_t> key = Block<std::int32_t>{} + taken_keys_[j];
+        ranks -= (key < keys) | (later & (key == keys));
       }
       for (std::size_t j = begin + block_size; j < sorted_count_; ++j)
         ranks -= Block<std::int32_t>{} + taken_keys_[j] < keys;
