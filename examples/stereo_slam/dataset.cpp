@@ -62,11 +62,15 @@ std::unique_ptr<Dataset> open_dataset(const DatasetOptions& options) {
   return with_rig(reader->second(folder));
 }
 
-void write_kitti_sequence(const Dataset& dataset, const std::filesystem::path& folder) {
+std::size_t write_kitti_sequence(const Dataset& dataset, const std::filesystem::path& folder,
+                                 const std::function<bool()>& go_on) {
   const cairn::StereoRig& rig = dataset.rig();
   if (!rig.rectified())
     cairn::raise(folder.string() + ": expected a rectified rig, a KITTI sequence cannot hold " +
                  dataset.name());
+  std::error_code unread;
+  if (std::filesystem::is_directory(folder, unread) && !std::filesystem::is_empty(folder, unread))
+    cairn::raise(folder.string() + ": expected a new folder or an empty one, this holds files");
   for (const char* images : {"image_0", "image_1"}) {
     std::error_code failure;
     std::filesystem::create_directories(folder / images, failure);
@@ -75,7 +79,9 @@ void write_kitti_sequence(const Dataset& dataset, const std::filesystem::path& f
   }
   std::string times;
   cairn::Trajectory truth;
-  for (std::size_t i = 0; i < dataset.size(); ++i) {
+  std::size_t written = 0;
+  for (bool on = true; on && written < dataset.size();) {
+    const std::size_t i = written++;
     const StereoFrame frame = dataset.frame(i);
     const std::string digits = std::to_string(i);
     const std::string file = std::string(6 - std::min<std::size_t>(6, digits.size()), '0') + digits + ".png";
@@ -84,11 +90,13 @@ void write_kitti_sequence(const Dataset& dataset, const std::filesystem::path& f
     cairn::append_number(times, frame.time);
     times += '\n';
     if (frame.truth) truth.push_back({frame.time, *frame.truth});
+    on = !go_on || go_on();
   }
   cairn::write_file_atomically(folder / "times.txt", times);
   cairn::write_file_atomically(folder / "calib.txt",
                                projection("P0:", rig.left, 0) + projection("P1:", rig.right, rig.baseline()));
-  if (truth.size() == dataset.size()) cairn::write_kitti(folder / "poses.txt", truth);
+  if (truth.size() == written) cairn::write_kitti(folder / "poses.txt", truth);
+  return written;
 }
 
 }  // namespace stereo_slam

@@ -7,6 +7,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -66,8 +67,10 @@ struct DatasetOptions {
 [[nodiscard]] std::unique_ptr<Dataset> open_dataset(const DatasetOptions& options);
 
 /// Writes the frames as a KITTI odometry sequence (image_0, image_1, times.txt, calib.txt, poses.txt) that
-/// other systems read. Needs a rectified rig; poses.txt is written when every frame has its truth. Throws
-/// cairn::Error when the folder cannot be written.
-void write_kitti_sequence(const Dataset& dataset, const std::filesystem::path& folder);
+/// other systems read, and returns how many there are: all, or those until go_on() says no, which is asked
+/// after each. Needs a rectified rig; poses.txt is written when every frame has its truth. Throws
+/// cairn::Error where the folder cannot be written or holds anything: nothing of anybody's is replaced.
+std::size_t write_kitti_sequence(const Dataset& dataset, const std::filesystem::path& folder,
+                                 const std::function<bool()>& go_on = {});
 
 }  // namespace stereo_slam

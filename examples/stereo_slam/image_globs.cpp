@@ -158,6 +158,9 @@ Recording read_images(const ImageGlobs& images) {
   }
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const Path& file = left[pairs[i].first];
+    if (file.lexically_normal() == right[pairs[i].second].lexically_normal())
+      cairn::raise(file.string() +
+                   ": expected another image of the right camera, --left and --right name the same");
     const double time =
         clock ? stamp_of(file)->time.value() : static_cast<double>(i) / images.rate.value_or(assumed_rate);
     recording.frames.push_back({i, time, file, right[pairs[i].second], std::nullopt});

@@ -33,6 +33,7 @@
 #include "support/interruption.hpp"
 #include "support/live_page.hpp"
 #include "support/progress.hpp"
+#include "support/result_folder.hpp"
 #include "support/rig_file.hpp"
 #include "support/standard_output.hpp"
 #include "there_and_back.hpp"
@@ -166,6 +167,7 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
 struct Run {
   stereo_slam::RunRecord record;
   int code = example::exit_well;
+  std::optional<std::string> not_saved{};  ///< why there is no map
 };
 
 /// The report of a run that is under way.
@@ -222,8 +224,12 @@ Run run(const stereo_slam::Dataset& dataset, const Arguments& arguments, example
     why = error.what();
     result.code = example::exit_data_ended;
   }
-  if (!arguments.save_map.empty() && progress.done() > 0)
-    stereo_slam::save_map(arguments.save_map, pipeline.map());
+  try {  // a full disk is said when the results are there
+    if (!arguments.save_map.empty() && progress.done() > 0)
+      stereo_slam::save_map(arguments.save_map, pipeline.map());
+  } catch (const cairn::Error& error) {
+    result.not_saved = error.what();
+  }
   stereo_slam::RunRecord& record = result.record = record_so_far();
   record.newest.reset();
   if (!why.empty())
@@ -231,6 +237,22 @@ Run run(const stereo_slam::Dataset& dataset, const Arguments& arguments, example
                          std::to_string(dataset.size()) + " frames: " + why;
   record.seconds = std::chrono::duration<double>(Clock::now() - start).count();
   return result;
+}
+
+/// Writes the frames as a KITTI sequence, those before an interruption where there is one.
+int dump(const stereo_slam::Dataset& dataset, const std::filesystem::path& folder) {
+  example::Progress progress(std::cerr, "frames", dataset.size());
+  const example::Interruption interruption;
+  const std::size_t written = stereo_slam::write_kitti_sequence(dataset, folder, [&] {
+    progress.step();
+    return !interruption.caught();
+  });
+  if (const auto signal = interruption.caught())
+    std::cerr << "stereo_slam: interrupted (" << *signal << ") after " << written << " of " << dataset.size()
+              << " frames\n";
+  std::cout << "KITTI odometry sequence of " << written << " frames: " << folder.string() << '\n';
+  if (!example::flush_standard_output("stereo_slam")) return example::exit_mistake;
+  return interruption.caught() ? example::exit_interrupted : example::exit_well;
 }
 
 /// The run in a few lines; summary.json has everything.
@@ -288,10 +310,7 @@ int main(int argc, char** argv) {
     }
     auto frames = stereo_slam::open_dataset(arguments.dataset);
     if (arguments.there_and_back) frames = stereo_slam::there_and_back(std::move(frames));
-    if (!arguments.dump.empty()) {
-      stereo_slam::write_kitti_sequence(*frames, arguments.dump);
-      return 0;
-    }
+    if (!arguments.dump.empty()) return dump(*frames, arguments.dump);
     if (given) {
       // What was calibrated well may have come loose since: never surer than by default.
       cairn::RigSigmas& rig = arguments.pipeline.rig;
@@ -299,6 +318,12 @@ int main(int argc, char** argv) {
       rig.direction = std::max(rig.direction, given->angle_sigma().value_or(0));
     }
     stereo_slam::prepare_output_folder(arguments.out);
+    example::expect_file_can_be_made(arguments.save_map);
+    example::expect_file_can_be_made(arguments.save_rig);
+    if (!arguments.save_map.empty() &&
+        arguments.save_map.lexically_normal() == arguments.save_rig.lexically_normal())
+      cairn::raise(arguments.save_map.string() +
+                   ": expected two names, one for --save and one for --save-rig");
     arguments.pipeline.sample_frame = frames->size() / 2;
     std::optional<example::LivePage> live;
     if (arguments.live) {
@@ -309,18 +334,20 @@ int main(int argc, char** argv) {
     const Run done = run(*frames, arguments, live ? &*live : nullptr);
     if (done.record.ended_early) std::cerr << "stereo_slam: " << *done.record.ended_early << '\n';
     if (done.record.frames.empty()) return done.code;  // the results of an earlier run stay
-    if (!arguments.save_rig.empty()) {
-      if (!given) given.emplace();
-      given->rig = frames->rig();  // which knows the size of its images
-      example::write_rig(arguments.save_rig, stereo_slam::learned_rig(*given, done.record));
-    }
     const std::optional<std::string> no_report = stereo_slam::write_outputs(done.record, arguments.out);
     if (live && !no_report) live->finish(cairn::read_file(arguments.out / "report.html"));
     print_summary(done.record);
     if (arguments.there_and_back && !done.record.ended_early) print_return(done.record);
     if (no_report) std::cout << "no report.html: " << *no_report << '\n';
     std::cout << "results: " << arguments.out.string() << '\n';
-    return example::flush_standard_output("stereo_slam") ? done.code : example::exit_mistake;
+    const bool said = example::flush_standard_output("stereo_slam");
+    if (!arguments.save_rig.empty()) {
+      if (!given) given.emplace();
+      given->rig = frames->rig();  // which knows the size of its images
+      example::write_rig(arguments.save_rig, stereo_slam::learned_rig(*given, done.record));
+    }
+    if (done.not_saved) cairn::raise(*done.not_saved);
+    return said ? done.code : example::exit_mistake;
   } catch (const std::exception& error) {
     std::cerr << "stereo_slam: " << error.what() << '\n';
     return example::exit_mistake;

@@ -280,4 +280,12 @@ void ResultFolder::replace(const std::function<void(const fs::path& staging)>& f
   deliver(folder / complete_inside, folder, names_);
 }
 
+void expect_file_can_be_made(const fs::path& file) {
+  if (file.empty()) return;
+  const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
+  std::error_code failure;
+  if (!fs::is_directory(folder, failure) || fs::is_directory(file, failure))
+    cairn::raise(file.string() + ": expected the name of a file in a folder that there is");
+}
+
 }  // namespace example

@@ -41,4 +41,8 @@ private:
   std::vector<std::string> names_;
 };
 
+/// A file that is written after the work, outside of the results: throws cairn::Error naming it, before the
+/// work, where it cannot be made by that name. Nothing where `file` is empty.
+void expect_file_can_be_made(const std::filesystem::path& file);
+
 }  // namespace example

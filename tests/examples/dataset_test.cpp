@@ -498,7 +498,7 @@ TEST_SUITE("dataset") {
     options.height = 120;
     options.cache = false;
     const auto arena = stereo_slam::open_arena(options, 3, 2);
-    write_kitti_sequence(*arena, folder / "sequence");
+    CHECK(write_kitti_sequence(*arena, folder / "sequence") == 3);
     const auto read = open("kitti_odometry", folder / "sequence");
     REQUIRE(read->size() == 3);
     CHECK(read->rig().left.fx() == arena->rig().left.fx());
@@ -512,6 +512,11 @@ TEST_SUITE("dataset") {
       REQUIRE(b.truth.has_value());
       CHECK(distance(*a.truth, *b.truth) < 1e-12);
     }
+    CHECK(says(cairn_test::message_of([&] { write_kitti_sequence(*arena, folder / "sequence"); }),
+               {"sequence", "an empty one"}));  // it holds files, which may be anybody's
+    int left = 2;
+    CHECK(write_kitti_sequence(*arena, folder / "cut", [&] { return --left > 0; }) == 2);
+    CHECK(open("kitti_odometry", folder / "cut")->size() == 2);
     folder.put("file", "");
     CHECK(says(cairn_test::message_of([&] { write_kitti_sequence(*arena, folder / "file"); }),
                {"file", "cannot make the folder"}));

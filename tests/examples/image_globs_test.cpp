@@ -96,6 +96,13 @@ TEST_SUITE("image_globs") {
     CHECK(says(refusal(unequal.globs()), "2 left images and 1 right ones"));
   }
 
+  TEST_CASE("image_globs: the same image of both cameras is refused") {
+    const Images both({"1.pgm", "2.pgm"}, {});
+    auto globs = both.globs(1);
+    globs.right = globs.left;
+    CHECK(says(refusal(globs), "--left and --right name the same"));
+  }
+
   TEST_CASE("image_globs: a pattern that no file has is named") {
     const Images none({}, {"1.pgm"});
     CHECK(says(refusal(none.globs()), "--left '"));

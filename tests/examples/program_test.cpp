@@ -152,6 +152,23 @@ TEST_SUITE("program") {
     CHECK(summary_in(folder / "second")["keyframes"] == summary_in(folder / "first")["keyframes"]);
     CHECK(names_in(folder / "second") == results());
     CHECK(run("--localise --out " + named("third")).code == 2);
+    // What cannot be saved is said before the run; a full disk when the results are there.
+    for (const char* option : {"--save", "--save-rig"}) {
+      CAPTURE(option);
+      const Outcome nowhere =
+          run("--frames 3 " + std::string(option) + " " + named("no/where") + " --out " + named("fourth"));
+      CHECK(nowhere.code == 2);
+      CHECK(nowhere.says("expected the name of a file in a folder"));
+      CHECK_FALSE(fs::exists(folder / "fourth" / "summary.json"));
+      const Outcome full = run("--frames 3 " + std::string(option) + " /dev/full --out " + named("fourth"));
+      CHECK(full.code == 2);
+      CHECK(full.says("/dev/full"));
+      CHECK(fs::exists(folder / "fourth" / "summary.json"));
+      fs::remove_all(folder / "fourth");
+    }
+    CHECK(
+        run("--frames 3 --save " + named("one") + " --save-rig " + named("one")).says("expected two names"));
+
     tear(folder / "map");
     for (const char* bad : {"map", "none"}) {
       const Outcome outcome = run("--frames 4 --load " + named(bad) + " --out " + named("third"));
