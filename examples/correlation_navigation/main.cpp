@@ -6,10 +6,12 @@
 // Exit codes: 0 all of them; 2 a mistake; 4 interrupted, the results are of the experiments before.
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdint>
 #include <exception>
 #include <filesystem>
 #include <iostream>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -93,6 +95,17 @@ private:
   example::Interruption interruption_;
 };
 
+/// Whether all values are the same, voids aside.
+bool is_flat(const cairn::FieldGrid& field) {
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for (const double value : field.values())
+    if (!std::isnan(value)) {
+      low = std::min(low, value);
+      high = std::max(high, value);
+    }
+  return !(high > low);
+}
+
 /// All experiments, or those before an interruption; throws Interrupted where that is none.
 Results run(const cairn::FieldGrid& field, const Options& options) {
   Results results;
@@ -120,6 +133,13 @@ Results run(const cairn::FieldGrid& field, const Options& options) {
       straight.on_run = step;
       results.divergence = divergence(straight, starts_off);
     });
+    if (is_flat(field)) {
+      results.notes.emplace_back(
+          "the terrain is flat: there is nothing to navigate by, and acquisition, the flight with turns and "
+          "the "
+          "loop are left out");
+      return results;
+    }
     experiments.fly("acquisition", options.starts, [&](const auto& step) {
       results.acquisition = acquire(
           field,
