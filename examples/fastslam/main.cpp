@@ -79,7 +79,8 @@ void print(const Results& r, const std::filesystem::path& out) {
   if (r.path_error)
     std::cout << "path " << *r.path_error << " m, odometry " << *r.odometry_error
               << " m (rms after a rigid fit)\n";
-  if (r.landmark_error) std::cout << "landmarks " << *r.landmark_error << " m\n";
+  if (r.landmark_error)
+    std::cout << "landmarks " << *r.landmark_error << " m (rms after a rigid fit of their own)\n";
   if (r.median_nees)
     std::cout << "NEES of the pose " << *r.median_nees << " (median; 2.4 where its covariance is right)\n";
   if (r.gps_median) std::cout << "GPS " << *r.gps_median << " m from the path (median after a rigid fit)\n";

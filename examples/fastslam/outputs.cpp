@@ -116,7 +116,11 @@ void add_map(example::Report& page, const Results& r) {
       .caption =
           "The particles' mean path and the best particle's landmarks with ellipses of two standard "
           "deviations" +
-          std::string(r.truth.empty() ? ", where the robot began." : ", moved rigidly onto the truth."),
+          std::string(r.truth.empty() ? ", where the robot began."
+                      : r.T_truth_landmarks
+                          ? ", each moved rigidly onto its own truth: the mean of many paths and the map of "
+                            "one particle have no frame in common."
+                          : ", moved rigidly onto the truth."),
       .x = {"x", "m"},
       .y = {"y", "m"},
       .curves = {},
@@ -140,7 +144,7 @@ void add_map(example::Report& page, const Results& r) {
   plot.curves.push_back(curve_of("path", Ink::belief, places_of(r.mean), T));
   if (!r.true_landmarks.empty())
     plot.curves.push_back(curve_of("true landmarks", Ink::truth, r.true_landmarks, {}, true));
-  plot.curves.push_back(ellipses(r.landmarks, T));
+  plot.curves.push_back(ellipses(r.landmarks, r.T_truth_landmarks.value_or(T)));
   page.add(plot);
 }
 
@@ -197,7 +201,7 @@ example::PlaneCurve together(const std::string& name, Ink ink,
 
 void add_film(example::Report& page, const Results& r) {
   if (r.snapshots.empty()) return;
-  const cairn::SE2 T = into_truth(r);
+  const cairn::SE2 T = r.T_truth_landmarks.value_or(into_truth(r));  // as the best particle's map lies
   example::PlaneFilm film{
       .title = "Particles and their landmarks over time",
       .caption =
@@ -257,7 +261,8 @@ std::optional<std::string> report(const Results& r) {
     page.figure({"NEES", readable(*r.median_nees), "",
                  "of the pose, median of the frames; 2.4 where its covariance is right"});
   if (r.landmark_error)
-    page.figure({"Landmarks' error", readable(*r.landmark_error), "m", "root mean square after a rigid fit"});
+    page.figure({"Landmarks' error", readable(*r.landmark_error), "m",
+                 "root mean square after a rigid fit of their own"});
   add_map(page, r);
   add_film(page, r);
   add_steps(page, r);

@@ -104,6 +104,7 @@ void measure_unnamed_landmarks(Results& r) {
   if (!fit) return;
   for (const Vector<2>& place : found) is.push_back(nearest_to(*fit * place, r.true_landmarks));
   r.landmark_error = rms(found, is, *fit);
+  r.T_truth_landmarks = fit;
 }
 
 void measure_landmarks(Results& r, const LandmarkLog& log) {
@@ -114,7 +115,9 @@ void measure_landmarks(Results& r, const LandmarkLog& log) {
       found.push_back(l.belief.mean);
       is.push_back(truth->second);
     }
-  if (found.size() >= 2) r.landmark_error = rms(found, is, rigid_fit(found, is));
+  if (found.size() < 2) return;
+  r.T_truth_landmarks = rigid_fit(found, is);
+  r.landmark_error = rms(found, is, *r.T_truth_landmarks);
 }
 
 /// GPS beside the path. The receiver of such a car jumps by tens of metres: the motion is fitted to the fixes

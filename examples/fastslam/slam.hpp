@@ -96,6 +96,8 @@ struct Results {
   /// Root mean square after the rigid motion that fits the path best to the truth [m]; of the landmarks, by
   /// identity where it is known, else to the nearest true one, after the motion that fits them best.
   std::optional<double> path_error{}, odometry_error{}, landmark_error{};
+  /// That motion of the landmarks. It is not the path's: that is the mean of all particles, the map one's.
+  std::optional<cairn::SE2> T_truth_landmarks{};
   std::optional<double> median_nees{};  ///< of the steps: 2.4 where the covariance is right
   std::optional<std::string> ended_early{};
   double seconds = 0, cpu_seconds = 0;
