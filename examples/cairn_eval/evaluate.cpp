@@ -38,7 +38,13 @@ Format format_of(const std::filesystem::path& path) {
 
 std::vector<PosePair> paired(const TrajectoryFile& truth, const TrajectoryFile& estimate,
                              const cairn::AssociationOptions& options) {
-  if (!truth.has_times && !estimate.has_times) return associate_by_index(truth.poses, estimate.poses);
+  if (!truth.has_times && !estimate.has_times) {
+    if (truth.poses.size() != estimate.poses.size())
+      cairn::raise(estimate.path.string() + ": expected as many poses as " + truth.path.string() +
+                   " has, as neither has times, found " + std::to_string(estimate.poses.size()) + " and " +
+                   std::to_string(truth.poses.size()));
+    return associate_by_index(truth.poses, estimate.poses);
+  }
   if (!truth.has_times || !estimate.has_times)
     cairn::raise((truth.has_times ? estimate : truth).path.string() +
                  ": a KITTI file has no times, and the other file has: give its times.txt with --times");
@@ -60,26 +66,51 @@ std::optional<cairn::KittiError> kitti_of(const TrajectoryFile& truth, const Tra
   return kitti_error(result.pairs, options);
 }
 
-NeesFigures nees_of(const Evaluation& result, const std::vector<StampedCovariance>& covariances) {
+/// The covariance of a time, or null. Times are written with fewer digits than they have.
+const StampedCovariance* at_time(const std::vector<StampedCovariance>& rows, double time) {
+  const auto found = std::lower_bound(rows.begin(), rows.end(), time - 1e-6,
+                                      [](const StampedCovariance& c, double t) { return c.time < t; });
+  return found != rows.end() && found->time <= time + 1e-6 ? &*found : nullptr;
+}
+
+/// Whether covariances can go with poses. Without times pose k has the number k for its time, which is no
+/// second of the covariances: they go row by row.
+void check(const CovarianceFile& covariances, const TrajectoryFile& estimate, AlignBy align) {
+  if (align == AlignBy::similarity)
+    cairn::raise("a covariance speaks of metres: NEES after --align similarity has no meaning");
+  if (!estimate.has_times && covariances.rows.size() != estimate.poses.size())
+    cairn::raise(covariances.path.string() + ": expected a covariance for each of the " +
+                 std::to_string(estimate.poses.size()) + " poses of " + estimate.path.string() +
+                 ", which has no times, found " + std::to_string(covariances.rows.size()) +
+                 ": give its times.txt with --times");
+}
+
+NeesFigures nees_of(const Evaluation& result, bool has_times, const CovarianceFile& covariances) {
   NeesFigures figures;
   const SE3 T_estimate_truth = result.absolute.T_truth_estimate.inverse();
   cairn::ConsistencyTest test(6);
-  for (const PosePair& pair : result.pairs) {
-    const auto found =
-        std::lower_bound(covariances.begin(), covariances.end(), pair.time - 1e-6,
-                         [](const StampedCovariance& c, double time) { return c.time < time; });
-    const bool there = found != covariances.end() && found->time <= pair.time + 1e-6;
+  for (std::size_t k = 0; k < result.pairs.size(); ++k) {
+    const PosePair& pair = result.pairs[k];
+    const StampedCovariance* const row =
+        has_times ? at_time(covariances.rows, pair.time) : &covariances.rows[k];
+    if (row == nullptr) {
+      ++figures.missing;
+      continue;
+    }
     const Vector<6> d = local(pair.estimate, SE3(T_estimate_truth * pair.truth));
-    const auto value = there ? cairn::normalised_squared(d, found->covariance) : std::nullopt;
+    const auto value = cairn::normalised_squared(d, row->covariance);
     if (!value) {
-      ++figures.left_out;
+      ++figures.no_inverse;
       continue;
     }
     test.add(*value);
     figures.times.push_back(pair.time);
     figures.values.push_back(*value);
   }
-  if (test.count() == 0) cairn::raise("no pose has a covariance of its time that has an inverse");
+  if (test.count() == 0)
+    cairn::raise(covariances.path.string() + ": no covariance to use: " + std::to_string(figures.missing) +
+                 " poses have none of their time, those of " + std::to_string(figures.no_inverse) +
+                 " have no inverse");
   figures.mean = test.mean();
   figures.band = test.band();
   return figures;
@@ -107,12 +138,12 @@ TrajectoryFile read_trajectory(const std::filesystem::path& path, Format format,
   return file;
 }
 
-std::vector<StampedCovariance> read_covariances(const std::filesystem::path& path) {
+CovarianceFile read_covariances(const std::filesystem::path& path) {
   constexpr std::size_t columns = 3 + 21;
   cairn::TextLines lines(path, "covariances of a trajectory");
   constexpr const char* names = "a line of names: frame,time,tracked,x_x,x_y, ... rz_rz";
   if (!lines.next('\0') || lines.line().substr(0, 19) != "frame,time,tracked,") lines.fail(names);
-  std::vector<StampedCovariance> result;
+  CovarianceFile file{path, {}};
   std::array<double, columns> n{};
   while (lines.next('\0')) {
     if (lines.numbers(',', n.data(), columns) != columns)
@@ -121,15 +152,15 @@ std::vector<StampedCovariance> read_covariances(const std::filesystem::path& pat
     std::size_t at = 3;
     for (int i = 0; i < 6; ++i)
       for (int j = i; j < 6; ++j) one.covariance(i, j) = one.covariance(j, i) = n[at++];
-    if (!result.empty() && one.time < result.back().time) lines.fail("times that do not run backwards");
-    result.push_back(one);
+    if (!file.rows.empty() && one.time < file.rows.back().time) lines.fail("times that do not run backwards");
+    file.rows.push_back(one);
   }
-  if (result.empty()) lines.fail("at least one line of 24 numbers");
-  return result;
+  if (file.rows.empty()) lines.fail("at least one line of 24 numbers");
+  return file;
 }
 
 Evaluation evaluate(const TrajectoryFile& truth, const TrajectoryFile& estimate,
-                    const std::vector<StampedCovariance>& covariances, const EvaluationOptions& options) {
+                    const std::optional<CovarianceFile>& covariances, const EvaluationOptions& options) {
   Evaluation result;
   result.pairs = paired(truth, estimate, options.association);
   result.poses = estimate.poses.size();
@@ -142,10 +173,10 @@ Evaluation evaluate(const TrajectoryFile& truth, const TrajectoryFile& estimate,
   result.absolute = *absolute;
   result.relative = relative_error(result.pairs, options.relative);
   result.kitti = kitti_of(truth, estimate, result, options.kitti);
-  if (!covariances.empty()) {
-    if (options.align == AlignBy::similarity)
-      cairn::raise("a covariance speaks of metres: NEES after --align similarity has no meaning");
-    result.nees = nees_of(result, covariances);
+  if (covariances) {
+    check(*covariances, estimate, options.align);
+    result.has_covariances = true;
+    if (absolute->rotation) result.nees = nees_of(result, estimate.has_times, *covariances);
   }
   return result;
 }

@@ -42,9 +42,15 @@ struct StampedCovariance {
   cairn::Matrix<6> covariance;  ///< translation [m], then rotation [rad]
 };
 
+/// Covariances as they were read.
+struct CovarianceFile {
+  std::filesystem::path path;
+  std::vector<StampedCovariance> rows;
+};
+
 /// Reads trajectory_covariance.csv of the example programs: a line of names, then time and the upper triangle
 /// (x_x, x_y, ... rz_rz) of each pose. Throws cairn::Error.
-[[nodiscard]] std::vector<StampedCovariance> read_covariances(const std::filesystem::path& path);
+[[nodiscard]] CovarianceFile read_covariances(const std::filesystem::path& path);
 
 struct EvaluationOptions {
   cairn::AlignBy align = cairn::AlignBy::rigid;
@@ -57,7 +63,8 @@ struct EvaluationOptions {
 struct NeesFigures {
   std::vector<double> times;   ///< of the pairs [s]
   std::vector<double> values;  ///< 6 on the average where the covariance is true
-  std::size_t left_out = 0;    ///< pairs whose covariance is missing or has no inverse
+  std::size_t missing = 0;     ///< pairs without a covariance of their time
+  std::size_t no_inverse = 0;  ///< pairs whose covariance has no inverse
   double mean = 0;
   cairn::ConsistencyBand band;  ///< of the mean, 95 %, as if all poses were independent, which they are not
 };
@@ -69,13 +76,15 @@ struct Evaluation {
   cairn::AbsoluteError absolute;  ///< after the alignment
   std::optional<cairn::RelativeError> relative;
   std::optional<cairn::KittiError> kitti;  ///< nothing where the path is shorter than every length
-  std::optional<NeesFigures> nees;         ///< where there were covariances
+  bool has_covariances = false;
+  std::optional<NeesFigures> nees;  ///< of the covariances, where the alignment determines attitudes
 };
 
-/// Throws cairn::Error in words where the two do not belong together: nothing in common in time, another
-/// number of poses, nothing to align by.
+/// Throws cairn::Error in words where the files do not belong together: nothing in common in time, another
+/// number of poses or covariances, nothing to align by. Covariances go with the poses of their times; where
+/// trajectories have none, row by row.
 [[nodiscard]] Evaluation evaluate(const TrajectoryFile& truth, const TrajectoryFile& estimate,
-                                  const std::vector<StampedCovariance>& covariances,
+                                  const std::optional<CovarianceFile>& covariances,
                                   const EvaluationOptions& options);
 
 }  // namespace cairn_eval

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <iostream>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -93,10 +94,10 @@ std::vector<NamedEvaluation> evaluate_all(const Options& o) {
   for (std::size_t i = 0; i < o.estimates.size(); ++i) {
     const TrajectoryFile estimate = read_trajectory(o.estimates[i], formats.at(o.format), o.times);
     const bool covers = !o.covariances.empty() && o.covariances[i] != "-";
-    all.push_back({o.names.empty() ? estimate.path.stem().string() : o.names[i],
-                   evaluate(truth, estimate,
-                            covers ? read_covariances(o.covariances[i]) : std::vector<StampedCovariance>(),
-                            o.evaluation)});
+    all.push_back(
+        {o.names.empty() ? estimate.path.stem().string() : o.names[i],
+         evaluate(truth, estimate, covers ? std::optional(read_covariances(o.covariances[i])) : std::nullopt,
+                  o.evaluation)});
   }
   return all;
 }

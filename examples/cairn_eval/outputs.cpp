@@ -63,13 +63,11 @@ Json json_of(const cairn::ErrorStatistics& s, double factor) {
 
 Json json_of(const NamedEvaluation& one) {
   const Evaluation& e = one.evaluation;
-  Json json{{"name", one.name},
-            {"poses", e.poses},
-            {"pairs", e.pairs.size()},
-            {"length_m", e.length},
-            {"scale", e.absolute.scale},
-            {"ate_m", json_of(e.absolute.translation, 1)},
-            {"attitude_error_deg", json_of(e.absolute.rotation, degrees)}};
+  Json json{{"name", one.name},          {"poses", e.poses},
+            {"pairs", e.pairs.size()},   {"length_m", e.length},
+            {"scale", e.absolute.scale}, {"ate_m", json_of(e.absolute.translation, 1)}};
+  // What the alignment does not determine is null, not a number.
+  json["attitude_error_deg"] = e.absolute.rotation ? json_of(*e.absolute.rotation, degrees) : Json();
   if (e.relative) {
     json["rpe_pairs"] = e.relative->translation.count;
     json["rpe_m"] = json_of(e.relative->translation, 1);
@@ -97,7 +95,10 @@ Json json_of(const NamedEvaluation& one) {
                     {"band_95_low", e.nees->band.low},
                     {"band_95_high", e.nees->band.high},
                     {"poses", e.nees->values.size()},
-                    {"left_out", e.nees->left_out}};
+                    {"without_covariance", e.nees->missing},
+                    {"without_inverse", e.nees->no_inverse}};
+  else if (e.has_covariances)
+    json["nees"] = nullptr;
   return json;
 }
 
@@ -257,7 +258,7 @@ example::Table table(const std::vector<NamedEvaluation>& all, const EvaluationOp
     const cairn::ErrorStatistics& ate = e.absolute.translation;
     table.rows.push_back({one.name, std::to_string(e.pairs.size()), readable(ate.rmse, 4),
                           readable(ate.median, 4), readable(ate.largest, 4),
-                          readable(e.absolute.rotation.rmse * degrees, 4),
+                          e.absolute.rotation ? readable(e.absolute.rotation->rmse * degrees, 4) : "-",
                           e.relative ? readable(e.relative->translation.rmse, 4) : "-",
                           e.relative ? readable(e.relative->rotation.rmse * degrees, 4) : "-",
                           e.kitti ? readable(e.kitti->overall.translation_percent(), 4) : "-",
@@ -270,6 +271,10 @@ example::Table table(const std::vector<NamedEvaluation>& all, const EvaluationOp
   return table;
 }
 
+constexpr const char* attitude_is_open =
+    "not determined by this alignment: the path is too near a straight line, which leaves the turn about it "
+    "free; see --align first";
+
 example::Report report_of(const std::vector<NamedEvaluation>& all, const EvaluationOptions& options) {
   example::Report report("Trajectories against the truth",
                          std::to_string(all.size()) + (all.size() == 1 ? " estimate" : " estimates") +
@@ -277,6 +282,10 @@ example::Report report_of(const std::vector<NamedEvaluation>& all, const Evaluat
   for (const NamedEvaluation& one : all)
     report.figure({"ATE of " + one.name, readable(one.evaluation.absolute.translation.rmse), "m",
                    "root mean square over " + std::to_string(one.evaluation.pairs.size()) + " poses"});
+  for (const NamedEvaluation& one : all)
+    if (!one.evaluation.absolute.rotation)
+      report.note("The attitude of " + one.name +
+                  (one.evaluation.has_covariances ? ", and so NEES, is " : " is ") + attitude_is_open + ".");
   report.add(table(all, options));
   report.add(paths(all));
   report.add(errors(all));
@@ -286,6 +295,14 @@ example::Report report_of(const std::vector<NamedEvaluation>& all, const Evaluat
   if (any([](const NamedEvaluation& one) { return one.evaluation.nees.has_value(); }))
     report.add(nees_over_time(all));
   return report;
+}
+
+std::string left_out(const NeesFigures& nees) {
+  std::string text;
+  if (nees.missing > 0) text += std::to_string(nees.missing) + " without a covariance of their time";
+  if (nees.no_inverse > 0)
+    text += (text.empty() ? "" : ", ") + std::to_string(nees.no_inverse) + " whose covariance has no inverse";
+  return text.empty() ? text : "; left out: " + text;
 }
 
 }  // namespace
@@ -299,8 +316,9 @@ std::string in_words(const std::vector<NamedEvaluation>& all, const EvaluationOp
             " poses have a partner, " + readable(e.length, 5) + " m\n";
     text += "  ATE    " + readable(ate.rmse, 4) + " m rmse, " + readable(ate.median, 4) + " median, " +
             readable(ate.largest, 4) + " largest; attitude " +
-            readable(e.absolute.rotation.rmse * degrees, 4) +
-            " deg rmse (aligned: " + name_of(options.align) +
+            (e.absolute.rotation ? readable(e.absolute.rotation->rmse * degrees, 4) + " deg rmse"
+                                 : std::string(attitude_is_open)) +
+            " (aligned: " + name_of(options.align) +
             (options.align == AlignBy::similarity ? ", scale " + readable(e.absolute.scale, 5) : "") + ")\n";
     text += "  RPE    " +
             (e.relative ? readable(e.relative->translation.rmse, 4) + " m, " +
@@ -318,10 +336,9 @@ std::string in_words(const std::vector<NamedEvaluation>& all, const EvaluationOp
       text += "  NEES   " + readable(e.nees->mean, 3) + " on the average of " +
               std::to_string(e.nees->values.size()) +
               " poses, 6 where the covariance is true (95 %: " + readable(e.nees->band.low, 3) + " to " +
-              readable(e.nees->band.high, 3) + " if independent)" +
-              (e.nees->left_out > 0 ? "; " + std::to_string(e.nees->left_out) + " without an inverse left out"
-                                    : "") +
-              "\n";
+              readable(e.nees->band.high, 3) + " if independent)" + left_out(*e.nees) + "\n";
+    else if (e.has_covariances)
+      text += "  NEES   needs attitudes, which this alignment does not determine (--align first)\n";
   }
   return text;
 }

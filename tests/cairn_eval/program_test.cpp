@@ -73,6 +73,7 @@ std::string erring(cairn::Trajectory& trajectory, double factor) {
   for (std::size_t i = 0; i < trajectory.size(); ++i) {
     Vector<6> d, sigma;
     sigma << 0.1, 0.2, 0.3, 0.01, 0.02, 0.03;
+    sigma *= 1 + 0.01 * static_cast<double>(i);  // another pose's covariance gives another NEES
     for (int k = 0; k < 6; ++k) d(k) = factor * sigma(k) * random.normal();
     trajectory[i].T_world_body = retract(trajectory[i].T_world_body, d);
     text += std::to_string(i) + "," + cairn::shortest(trajectory[i].time) + ",1";
@@ -126,10 +127,81 @@ TEST_CASE("cairn_eval: NEES of errors drawn from the covariances is 6, of errors
                            " --align none --covariances" + quoted(folder / "covariance.csv"));
     const Json& nees = summary["estimates"][0]["nees"];
     CHECK(nees["poses"] == 200);
-    CHECK(nees["left_out"] == 0);
+    CHECK(nees["without_covariance"] == 0);
+    CHECK(nees["without_inverse"] == 0);
     // 200 independent poses: the mean has the deviation sqrt(12 / 200) = 0.24, times the factor squared.
     CHECK(near(nees["mean"], 6 * factor * factor, 4 * 0.245 * factor * factor));
   }
+}
+
+TEST_CASE("cairn_eval: covariances go row by row with poses that have no times, and with times by those") {
+  const cairn_test::Folder folder;
+  const cairn::Trajectory truth = walk();
+  cairn::Trajectory estimate = truth;
+  std::string covariances = erring(estimate, 1), times;
+  for (const cairn::StampedPose& pose : truth) times += cairn::shortest(pose.time) + "\n";
+  cairn::write_tum(folder / "truth.tum", truth);
+  cairn::write_tum(folder / "estimate.tum", estimate);
+  cairn::write_kitti(folder / "truth.kitti", truth);
+  cairn::write_kitti(folder / "estimate.kitti", estimate);
+  cairn::write_file_atomically(folder / "covariance.csv", covariances);
+  cairn::write_file_atomically(folder / "times.txt", times);
+  const std::string kitti = quoted(folder / "truth.kitti") + quoted(folder / "estimate.kitti") +
+                            " --align first --covariances" + quoted(folder / "covariance.csv");
+  const Json by_row = scored(folder, kitti)["estimates"][0]["nees"];
+  const Json by_time =
+      scored(folder, kitti + " --times" + quoted(folder / "times.txt"))["estimates"][0]["nees"];
+  CHECK(by_row["poses"] == 200);
+  CHECK(by_row["without_covariance"] == 0);
+  CHECK(by_row == by_time);
+
+  // The second half has no covariance, and the first pose one without an inverse.
+  const std::size_t half = covariances.find("\n100,") + 1, first = covariances.find('\n') + 1;
+  covariances.resize(half);
+  std::string zeros = "0,0,1";
+  for (int i = 0; i < 21; ++i) zeros += ",0";
+  covariances.replace(first, covariances.find('\n', first) - first, zeros);
+  cairn::write_file_atomically(folder / "half.csv", covariances);
+  const Outcome outcome =
+      run(quoted(folder / "truth.tum") + quoted(folder / "estimate.tum") + " --align none --covariances" +
+          quoted(folder / "half.csv") + " --out" + quoted(folder / "half"));
+  CAPTURE(outcome.words);
+  CHECK(outcome.says("left out: 100 without a covariance of their time, 1 whose covariance has no inverse"));
+  const Json summary = Json::parse(cairn::read_file(folder / "half" / "summary.json"));
+  CHECK(summary["estimates"][0]["nees"]["poses"] == 99);
+  CHECK(summary["estimates"][0]["nees"]["without_covariance"] == 100);
+  CHECK(summary["estimates"][0]["nees"]["without_inverse"] == 1);
+}
+
+TEST_CASE("cairn_eval: a straight path has no error of the attitude after a fit, and the words say why") {
+  const cairn_test::Folder folder;
+  cairn::Trajectory truth, estimate;
+  for (int i = 0; i < 200; ++i) truth.push_back({0.1 * i, SE3(SO3(), Vector<3>(0, 0, i))});
+  estimate = truth;
+  cairn::write_file_atomically(folder / "covariance.csv", erring(estimate, 1));
+  cairn::write_tum(folder / "truth.tum", truth);
+  cairn::write_tum(folder / "estimate.tum", estimate);
+  const std::string files = quoted(folder / "truth.tum") + quoted(folder / "estimate.tum") +
+                            " --covariances" + quoted(folder / "covariance.csv") + " --out" +
+                            quoted(folder / "out");
+  const auto estimated = [&] {
+    return Json::parse(cairn::read_file(folder / "out" / "summary.json"))["estimates"][0];
+  };
+  const Outcome rigid = run(files);
+  CAPTURE(rigid.words);
+  CHECK(rigid.code == 0);
+  CHECK(rigid.says("attitude not determined by this alignment"));
+  CHECK(rigid.says("--align first"));
+  CHECK(rigid.says("NEES   needs attitudes"));
+  CHECK(estimated()["attitude_error_deg"].is_null());
+  CHECK(estimated()["nees"].is_null());
+  if (fs::exists(folder / "out" / "report.html"))
+    CHECK(cairn::read_file(folder / "out" / "report.html").find("not determined by this alignment") !=
+          std::string::npos);
+  const Outcome first = run(files + " --align first");
+  CHECK_FALSE(first.says("not determined"));
+  CHECK(estimated()["attitude_error_deg"]["rmse"].get<double>() > 0);
+  CHECK(estimated()["nees"]["poses"] == 200);
 }
 
 TEST_CASE(
@@ -199,7 +271,9 @@ TEST_CASE("cairn_eval: what does not belong together is exit code 2 and words th
   };
   says("truth.tum", "later.tum", "", "--offset");
   says("truth.tum", "truth.kitti", "", "--times");
-  says("truth.kitti", "short.kitti", "", "found 10 and 200");
+  says("truth.kitti", "short.kitti", "",
+       (folder / "short.kitti").string() + ": expected as many poses as " +
+           (folder / "truth.kitti").string() + " has, as neither has times, found 10 and 200");
   says("truth.tum", "bad.tum", "", "bad.tum:2: expected 8 numbers");
   says("truth.tum", "words.tum", "", "words.tum:1: expected");
   says("truth.tum", "seven.tum", "", "TUM (8 numbers between blanks)");
@@ -211,10 +285,19 @@ TEST_CASE("cairn_eval: what does not belong together is exit code 2 and words th
        "bad.csv:2: expected 24 numbers");
   says("truth.tum", "truth.tum", "--delta 0.5", "at least one frame");
   says("truth.tum", "truth.tum", "--align sideways", "sideways");
-  cairn::Trajectory estimate = truth;
+  cairn::Trajectory estimate = truth, longer = truth;
   cairn::write_file_atomically(folder / "covariance.csv", erring(estimate, 1));
+  longer.push_back({20, truth.back().T_world_body});
+  cairn::write_file_atomically(folder / "late.csv", erring(later, 1));
   says("truth.tum", "truth.tum", "--align similarity --covariances" + quoted(folder / "covariance.csv"),
        "has no meaning");
+  cairn::write_file_atomically(folder / "many.csv", erring(longer, 1));
+  says("truth.kitti", "truth.kitti", "--covariances" + quoted(folder / "many.csv"),
+       (folder / "many.csv").string() + ": expected a covariance for each of the 200 poses of " +
+           (folder / "truth.kitti").string() +
+           ", which has no times, found 201: give its times.txt with --times");
+  says("truth.tum", "truth.tum", "--offset 1e-3 --covariances" + quoted(folder / "late.csv"),
+       (folder / "late.csv").string() + ": no covariance to use: 200 poses have none of their time");
   CHECK(run("").code == 2);
 }
 

@@ -1,10 +1,12 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -81,7 +83,8 @@ TEST_SUITE("trajectory_error") {
     for (const auto& error : {rigid, first, scaled}) {
       REQUIRE(error.has_value());
       CHECK(error->translation.largest < 1e-11);
-      CHECK(error->rotation.largest < 1e-11);
+      REQUIRE(error->rotation.has_value());
+      CHECK(error->rotation->largest < 1e-11);
     }
     CHECK(scaled->scale == doctest::Approx(4.0).epsilon(1e-12));
     REQUIRE(none.has_value());
@@ -125,6 +128,72 @@ TEST_SUITE("trajectory_error") {
     const auto error = cairn::absolute_error(line, AlignBy::rigid);
     REQUIRE(error.has_value());
     CHECK(error->translation.rmse < 1e-12);
+    for (const AlignBy by : {AlignBy::rigid, AlignBy::similarity})
+      for (const std::size_t count : {2U, 3U, 20U})
+        CHECK_FALSE(cairn::absolute_error(std::span(line).first(count), by)->rotation.has_value());
+    for (const AlignBy by : {AlignBy::none, AlignBy::first_pose})
+      CHECK(cairn::absolute_error(line, by)->rotation.has_value());
+  }
+
+  TEST_CASE(
+      "trajectory_error: attitudes have an error where the path leaves its line by more than is wrong") {
+    const std::uint64_t seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const SE3 T = random_pose(random, 100.0);
+    for (const double bend : {0.0, 0.02, 0.5, 5.0})
+      for (const double wrong : {0.0, 1e-4, 0.01}) {
+        CAPTURE(bend);
+        CAPTURE(wrong);
+        std::vector<PosePair> pairs;
+        for (int i = 0; i < 100; ++i) {
+          const SE3 truth(SO3(), Vector<3>(i, bend * std::sin(0.1 * i), 0));
+          const Vector<3> noise(random.normal(), random.normal(), random.normal());
+          pairs.push_back({0.1 * i, truth, SE3(SO3(), truth.translation() + wrong * noise)});
+        }
+        for (const AlignBy by : {AlignBy::rigid, AlignBy::similarity}) {
+          const auto error = cairn::absolute_error(moved(pairs, T, 1.0), by);
+          REQUIRE(error.has_value());
+          CHECK(error->translation.rmse < 2 * wrong + 1e-9);
+          CHECK(error->rotation.has_value() == (bend > 10 * wrong));
+          if (error->rotation) CHECK(error->rotation->largest < 0.1);
+        }
+      }
+  }
+
+  TEST_CASE("trajectory_error: pieces of published paths have attitudes after a fit where those are right") {
+    const auto data = cairn_test::real_data("trajectories");
+    if (!data) return;
+    const double degree = std::acos(-1) / 180;
+    const Trajectory kitti = cairn::read_kitti(*data / "KITTI_00_gt.txt");
+    const auto orb = cairn::associate_by_index(kitti, cairn::read_kitti(*data / "KITTI_00_ORB.txt"));
+    const std::span<const PosePair> straight = std::span(orb).first(40);
+    CHECK_FALSE(cairn::absolute_error(straight, AlignBy::rigid)->rotation.has_value());
+    CHECK(std::abs(cairn::absolute_error(straight, AlignBy::first_pose)->rotation->rmse - 1.3 * degree) <
+          0.05 * degree);
+
+    std::size_t determined = 0;
+    double worst = 0;  // after a fit, beside that of the first pose
+    for (const std::vector<PosePair>& whole :
+         {orb, cairn::associate_by_index(kitti, cairn::read_kitti(*data / "KITTI_00_SPTAM.txt")),
+          cairn::associate(cairn::read_tum(*data / "fr2_desk_groundtruth.txt"),
+                           cairn::read_tum(*data / "fr2_desk_ORB.txt")),
+          cairn::associate(cairn::read_euroc(*data / "V102_groundtruth.csv"),
+                           cairn::read_tum(*data / "V102.txt"))}) {
+      CHECK(cairn::absolute_error(whole, AlignBy::rigid)->rotation->rmse < 3 * degree);
+      for (const std::size_t count : {10U, 20U, 40U, 80U, 160U, 320U, 640U})
+        for (std::size_t i = 0; i + count <= whole.size(); i += count) {
+          const std::span<const PosePair> piece = std::span(whole).subspan(i, count);
+          const auto rigid = cairn::absolute_error(piece, AlignBy::rigid);
+          REQUIRE(rigid.has_value());
+          if (!rigid->rotation) continue;
+          ++determined;
+          const auto first = cairn::absolute_error(piece, AlignBy::first_pose);
+          worst = std::max(worst, rigid->rotation->rmse - first->rotation->rmse);
+        }
+    }
+    CHECK(determined > 500);
+    CHECK(worst < 10.2 * degree);
   }
 
   TEST_CASE("relative_error: a constant slip per frame shows in frames and in metres") {

@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -46,6 +47,42 @@ double distance(const SE3& a, const SE3& b) {
 }  // namespace
 
 TEST_SUITE("alignment") {
+  TEST_CASE("align_points: a turn about the line that points are near to costs what turn_cost says") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    Points source = random_points(random, 50), target = source;
+    for (std::size_t i = 0; i < source.size(); ++i) {
+      source[i](0) *= 100;
+      target[i] = source[i] + 0.3 * Vector<3>(random.normal(), random.normal(), random.normal());
+    }
+    for (const bool with_scale : {false, true}) {
+      const Alignment best = align_points(source, target, {}, {.with_scale = with_scale});
+      const auto squares = [&](const SE3& turn) {
+        Vector<3> centre = Vector<3>::Zero();
+        for (const Vector<3>& p : target) centre += p / 50.0;
+        double sum = 0;
+        for (std::size_t i = 0; i < source.size(); ++i) {
+          const Vector<3> p = best.T_target_source * Vector<3>(best.scale * source[i]);
+          sum += (turn * Vector<3>(p - centre) + centre - target[i]).squaredNorm();
+        }
+        return sum;
+      };
+      // The cheapest axis of all is near x; none is cheaper than the cost says.
+      double cheapest = 1e300;
+      for (int k = 0; k < 2000; ++k) {
+        const Vector<3> axis = Vector<3>(1, 0.02 * random.normal(), 0.02 * random.normal()).normalized();
+        const double grown = squares(SE3(cairn::SO3::exp(0.5 * axis), Vector<3>::Zero())) - squares(SE3());
+        cheapest = std::min(cheapest, grown);
+      }
+      const double said = 2 * best.scale * best.turn_cost * (1 - std::cos(0.5));
+      CHECK(cheapest >= said * (1 - 1e-9));
+      CHECK(cheapest < said * 1.05);
+    }
+    for (Vector<3>& p : source) p = Vector<3>(p(0), 0, 0);
+    CHECK(align_points(source, source).turn_cost < 1e-9 * 50 * 100 * 100);
+  }
+
   TEST_CASE("align_points: exact data give the motion and the scale back to rounding") {
     const auto seed = cairn_test::seed();
     CAPTURE(seed);

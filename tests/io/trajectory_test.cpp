@@ -100,6 +100,24 @@ TEST_SUITE("trajectory") {
     CHECK(difference(trajectory[1].T_world_body, SE3(SO3(), Vector<3>(4, 5, 6))) == 0);
   }
 
+  TEST_CASE("trajectory: a byte-order mark of UTF-8 at the start is skipped, and nowhere else") {
+    const Folder folder;
+    const std::string mark = "\xEF\xBB\xBF", row = "1 0 0 0 0 1 0 0 0 0 1 0\n";
+    folder.put("a.tum", mark + "0 1 2 3 0 0 0 1\n");
+    CHECK(cairn::read_tum(folder / "a.tum").size() == 1);
+    folder.put("comment.tum", mark + "# said\n0 1 2 3 0 0 0 1\n");
+    CHECK(cairn::read_tum(folder / "comment.tum").size() == 1);
+    folder.put("a.kitti", mark + row);
+    folder.put("times.txt", mark + "7\n");
+    CHECK(cairn::read_kitti(folder / "a.kitti", folder / "times.txt")[0].time == 7);
+    folder.put("a.csv", mark + "#t\r\n1,0,0,0,1,0,0,0\r\n");
+    CHECK(cairn::read_euroc(folder / "a.csv").size() == 1);
+    for (const std::string& text : {row + mark + row, mark + mark + row, mark}) {
+      folder.put("bad.kitti", text);
+      CHECK_THROWS_AS(static_cast<void>(cairn::read_kitti(folder / "bad.kitti")), cairn::Error);
+    }
+  }
+
   TEST_CASE("trajectory: bad TUM files are refused with file, line and what was expected") {
     const Folder folder;
     const auto refusal = [&](const std::string& text) {

@@ -72,8 +72,9 @@ enum class AlignBy {
 };
 
 struct AbsoluteError {
-  ErrorStatistics translation;    ///< [m]
-  ErrorStatistics rotation;       ///< angle between the attitudes [rad]
+  ErrorStatistics translation;  ///< [m]
+  /// Angle between the attitudes [rad]; nothing where positions near a line leave the turn about it open.
+  std::optional<ErrorStatistics> rotation;
   std::vector<double> distances;  ///< of each pair, for plots [m]
   SE3 T_truth_estimate;           ///< the alignment: maps the estimate's world to the truth's
   double scale = 1;               ///< applied to the estimate's positions before T_truth_estimate
@@ -88,10 +89,13 @@ inline void expect_finite(std::span<const PosePair> pairs, const char* who) {
 }
 
 /// T_align and scale of (1); nothing where the positions do not determine them.
-inline std::optional<std::pair<SE3, double>> alignment_of(std::span<const PosePair> pairs, AlignBy by) {
-  if (by == AlignBy::none) return std::pair(SE3(), 1.0);
-  if (by == AlignBy::first_pose)
-    return std::pair(pairs.front().truth * pairs.front().estimate.inverse(), 1.0);
+inline std::optional<Alignment> alignment_of(std::span<const PosePair> pairs, AlignBy by) {
+  Alignment given;
+  if (by == AlignBy::none) return given;
+  if (by == AlignBy::first_pose) {
+    given.T_target_source = pairs.front().truth * pairs.front().estimate.inverse();
+    return given;
+  }
   std::vector<Vector<3>> estimate, truth;
   for (const PosePair& pair : pairs) {
     estimate.push_back(pair.estimate.translation());
@@ -100,14 +104,26 @@ inline std::optional<std::pair<SE3, double>> alignment_of(std::span<const PosePa
   const Alignment found =
       align_points(estimate, truth, {}, {.with_scale = by == AlignBy::similarity, .tolerance = 1e-12});
   if (found.rank == 0) return std::nullopt;
-  return std::pair(found.T_target_source, found.scale);
+  return found;
+}
+
+/// Whether positions determine the turn about the line that they are near to: a turn by 15 degrees at least
+/// doubles the squares that are left, 2 scale (s2 + s3) (1 - cos 15) >= squares. How far the path departs
+/// from the line is so weighed against the errors of the estimate, not against the length: a good estimate
+/// knows its turn from a slighter curve. The test holds it to 2379 pieces of published paths: 535 pass, and
+/// no attitude of those is more than 10.2 degrees worse than after AlignBy::first_pose.
+inline bool turn_is_determined(const Alignment& alignment, double squares) {
+  constexpr double one_minus_cosine = 0.034074173710931713;
+  return alignment.status != AlignmentStatus::ambiguous &&
+         2 * alignment.scale * alignment.turn_cost * one_minus_cosine >= squares;
 }
 
 }  // namespace detail
 
 /// Absolute error (1), or nothing when there are no pairs, or all positions are the same and by asks for a
 /// fit to them. A path along a straight line is aligned with the rotation about the line left as it falls:
-/// distances are right, attitudes are not. Throws Error naming a pair with a pose that is not finite. O(n).
+/// distances are right, the error of the attitude is nothing (AlignBy::first_pose gives one). Throws Error
+/// naming a pair with a pose that is not finite. O(n).
 [[nodiscard]] inline std::optional<AbsoluteError> absolute_error(std::span<const PosePair> pairs,
                                                                  AlignBy by = AlignBy::rigid) {
   if (pairs.empty()) return std::nullopt;
@@ -115,8 +131,8 @@ inline std::optional<std::pair<SE3, double>> alignment_of(std::span<const PosePa
   const auto alignment = detail::alignment_of(pairs, by);
   if (!alignment) return std::nullopt;
   AbsoluteError result;
-  result.T_truth_estimate = alignment->first;
-  result.scale = alignment->second;
+  result.T_truth_estimate = alignment->T_target_source;
+  result.scale = alignment->scale;
   std::vector<double> angles;
   for (const PosePair& pair : pairs) {
     const Vector<3> position =
@@ -126,7 +142,9 @@ inline std::optional<std::pair<SE3, double>> alignment_of(std::span<const PosePa
     angles.push_back((pair.truth.rotation().inverse() * attitude).angle());
   }
   result.translation = error_statistics(result.distances);
-  result.rotation = error_statistics(angles);
+  const bool fitted = by == AlignBy::rigid || by == AlignBy::similarity;
+  if (!fitted || detail::turn_is_determined(*alignment, result.translation.sum_of_squares))
+    result.rotation = error_statistics(angles);
   return result;
 }
 void absolute_error(const Trajectory&, const Trajectory&, AlignBy = {}) = delete;  ///< associate() them

@@ -61,7 +61,10 @@ struct AlignmentOptions {
 struct Alignment {
   SE3 T_target_source;
   double scale = 1;
-  int rank = 0;         ///< of the point sets: 3 space, 2 plane, 1 line, 0 one place
+  int rank = 0;  ///< of the point sets: 3 space, 2 plane, 1 line, 0 one place
+  /// s2 + s3 [m^2]: one more turn by an angle a, about the axis that matters least (the line that the points
+  /// are near to), adds 2 scale turn_cost (1 - cos a) to the squares.
+  double turn_cost = 0;
   double rms = 0;       ///< root of the weighted mean squared distance that is left
   double variance = 0;  ///< estimated variance of a point of weight 1: weighted squares / (3n - 6 or 7)
   /// Of a right step (translation, rotation) of T_target_source, scale held, where w are inverse variances
@@ -240,6 +243,7 @@ inline void alignment_covariance(const AlignmentMoments& m, double scale, bool d
       std::max(0.0, m.target_squares - 2 * result.scale * fit + result.scale * result.scale * source_squares);
   const double reflected = std::max(0.0, left + 4 * result.scale * std::min(s3, 0.0));
   const double dof = 3.0 * static_cast<double>(source.size()) - (options.with_scale ? 7 : 6);
+  result.turn_cost = std::max(0.0, s2 + s3);
   result.rms = std::sqrt(left / m.weight);
   result.variance = left / std::max(dof, 1.0);
 

@@ -61,12 +61,14 @@ template <class Number>
 }
 
 /// The lines of a text file, with the place of the current one for messages. Accepts LF and CR LF, with or
-/// without a last line end.
+/// without a last line end, and skips a byte-order mark of UTF-8 at the start.
 class TextLines {
 public:
   /// Reads the whole file; throws Error as read_file does.
   explicit TextLines(const std::filesystem::path& path, std::string_view expected)
-      : name_(path.string()), text_(read_file(path, expected)) {}
+      : name_(path.string()), text_(read_file(path, expected)) {
+    if (std::string_view(text_).substr(0, 3) == "\xEF\xBB\xBF") position_ = 3;
+  }
   TextLines(const TextLines&) = delete;  // line() looks into the text held here
   TextLines& operator=(const TextLines&) = delete;
 
