@@ -61,6 +61,17 @@ public:
     return root.blocks[root.place(address)].own()[place_in_block(address)].own();
   }
 
+  /// Whether all tiles from `low` to `high` can be written: the grid would not become too wide.
+  [[nodiscard]] bool has_room(TileAddress low, TileAddress high) const noexcept {
+    TileAddress first = {low.column >> 4, low.row >> 4}, last = {high.column >> 4, high.row >> 4};
+    if (const Root* root = root_.get()) {
+      first = {std::min(first.column, root->column), std::min(first.row, root->row)};
+      last = {std::max(last.column, root->column + root->columns - 1),
+              std::max(last.row, root->row + root->rows - 1)};
+    }
+    return last.column - first.column < most_blocks && last.row - first.row < most_blocks;
+  }
+
   /// Reads many cells, neighbours soonest: two loads and a comparison are spared within a tile. Lives no
   /// longer than the grid, and only until it is changed.
   class Reader {
@@ -130,7 +141,8 @@ public:
   }
 
 private:
-  static constexpr std::int32_t block_side = 16;  // tiles
+  static constexpr std::int32_t block_side = 16;        // tiles
+  static constexpr std::int32_t most_blocks = 1 << 12;  // a side
   static constexpr std::size_t none = ~std::size_t{0};
   using Block = std::array<Counted<Tile>, static_cast<std::size_t>(block_side* block_side)>;
 
@@ -150,7 +162,6 @@ private:
   }
 
   void grow(TileAddress address) {
-    constexpr std::int32_t most = 1 << 12;  // blocks a side
     const std::int32_t c = address.column >> 4, r = address.row >> 4;
     Root next{c, r, 1, 1, {}};
     if (const Root* old = root_.get()) {
@@ -159,7 +170,7 @@ private:
       next.columns = std::max(c + 1, old->column + old->columns) - next.column;
       next.rows = std::max(r + 1, old->row + old->rows) - next.row;
     }
-    if (next.columns > most || next.rows > most)
+    if (next.columns > most_blocks || next.rows > most_blocks)
       raise("SharedTiles: expected cells within a square of 65536 tiles, found tile " +
             std::to_string(address.column) + ", " + std::to_string(address.row) + " outside of it");
     next.blocks.resize(static_cast<std::size_t>(next.columns) * static_cast<std::size_t>(next.rows));
