@@ -59,7 +59,8 @@ struct Drive {
   std::string name = "rendered terrain";
   std::optional<Terrain> terrain{};  ///< nothing where the ground is a real one
   std::vector<TerrainScan> scans;
-  std::vector<cairn::SE2> truth;  ///< of the vehicle at each scan
+  std::vector<cairn::SE2> truth;             ///< of the vehicle at each scan
+  std::optional<std::string> ended_early{};  ///< why a recording is not driven to its end
 };
 
 /// Where visual odometry does not tell a motion, the step before is made again, with a covariance that says

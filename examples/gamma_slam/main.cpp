@@ -4,10 +4,12 @@
 // Gamma-SLAM: rough ground mapped by the spread of its heights, from a stereo camera and visual odometry. The
 // drive is rendered, so that truth is known: two laps, 20 m of each with hardly anything to follow. Or it is
 // recorded: its frames forwards, then backwards.
-// Exit codes: 0 well; 2 a mistake; 4 interrupted, the results are of the scans before.
+// Exit codes: 0 well; 2 a mistake; 3 the recording broke off, 4 interrupted: the results are of the scans
+// before.
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <optional>
@@ -30,15 +32,19 @@ namespace {
 
 using namespace gamma_slam;
 
-Results run_with_progress(const Drive& drive, const RunOptions& options) {
-  const example::Interruption interruption;
-  example::Progress progress(std::clog, "scans", drive.scans.size());
-  return run(drive, options, [&]() -> std::optional<std::string> {
+/// What to call after every scan or frame.
+std::function<std::optional<std::string>()> watched(example::Progress& progress, const char* what) {
+  return [&progress, what]() -> std::optional<std::string> {
     progress.step();
     if (const auto signal = example::Interruption::caught())
-      return "interrupted (" + *signal + ") after " + std::to_string(progress.done()) + " scans";
+      return "interrupted (" + *signal + ") after " + std::to_string(progress.done()) + " " + what;
     return std::nullopt;
-  });
+  };
+}
+
+Results run_with_progress(const Drive& drive, const RunOptions& options) {
+  example::Progress progress(std::clog, "scans", drive.scans.size());
+  return run(drive, options, watched(progress, "scans"));
 }
 
 void print(const Results& r, const std::filesystem::path& out) {
@@ -72,8 +78,11 @@ int main(int argc, char** argv) {
   app.add_option("--cell-size", options.map.geometry.cell_size, "[m]")
       ->check(example::number_between(0.05, 2));
 #ifdef GAMMA_SLAM_HAS_RECORDINGS
-  auto* const folder = app.add_option("--drive", recorded.folder,
-                                      "a folder of recorded stereo images, driven forwards and backwards");
+  auto* const folder = app.add_option(
+      "--drive", recorded.folder,
+      "a folder of recorded stereo images and their true poses (poses_cam0_rectified.txt "
+      "of kitti_raw, poses.txt of kitti_odometry, state_groundtruth_estimate0/ of euroc), driven "
+      "forwards and backwards");
   app.add_option("--kind", recorded.kind, "of the folder: kitti_raw, kitti_odometry or euroc")
       ->check(CLI::IsMember({"kitti_raw", "kitti_odometry", "euroc"}))
       ->needs(folder);
@@ -95,16 +104,25 @@ int main(int argc, char** argv) {
     if (!recorded.folder.empty()) recording = opened_recording(recorded);
 #endif
     prepare_folder(out);
-    const Drive drive = [&] {
+    const example::Interruption interruption;
+    Drive drive;
 #ifdef GAMMA_SLAM_HAS_RECORDINGS
-      if (recording) return recorded_drive(*recording, recorded);
+    if (recording) {
+      example::Progress progress(std::clog, "frames", frame_count(*recording));
+      try {
+        drive = recorded_drive(*recording, recorded, watched(progress, "frames"));
+      } catch (const Interrupted& why) {
+        std::cerr << name << ": " << why.what() << ", before the first scan: nothing is written\n";
+        return example::exit_interrupted;
+      }
+    }
 #endif
-      return simulated_drive({.seed = options.seed, .laps = laps});
-    }();
+    if (drive.scans.empty()) drive = simulated_drive({.seed = options.seed, .laps = laps});
     const Results results = run_with_progress(drive, options);
     if (results.ended_early) std::cerr << name << ": " << *results.ended_early << '\n';
     if (const auto no_report = write_outputs(results, out)) std::cout << *no_report << '\n';
     print(results, out);
-    return results.ended_early ? example::exit_interrupted : example::exit_well;
+    if (!results.ended_early) return example::exit_well;
+    return results.ended_early == drive.ended_early ? example::exit_data_ended : example::exit_interrupted;
   });
 }

@@ -105,8 +105,9 @@ void add_plots(example::Report& page, const Results& r) {
       .y = {"y", "m"},
       .curves = {curve_of("visual odometry", Ink::wrong, r.odometry), curve_of("truth", Ink::truth, r.truth),
                  curve_of("path", Ink::belief, r.path)}});
-  std::vector<double> by_odometry, by_filter;
+  std::vector<double> time, by_odometry, by_filter;
   for (std::size_t i = 0; i < r.path.size(); ++i) {
+    time.push_back(r.time[i] - r.time.front());  // recordings have theirs since 1970
     by_odometry.push_back((r.odometry[i].translation() - r.truth[i].translation()).norm());
     by_filter.push_back((r.path[i].translation() - r.truth[i].translation()).norm());
   }
@@ -115,13 +116,13 @@ void add_plots(example::Report& page, const Results& r) {
       .caption = "Distance from the truth, of the best particle's path as it is believed at the end.",
       .x = {"time", "s"},
       .y = {"error", "m"},
-      .x_values = r.time,
+      .x_values = time,
       .curves = {{"visual odometry", Ink::wrong, by_odometry}, {"path", Ink::belief, by_filter}}});
   page.add(example::LinePlot{.title = "Effective number of particles",
                              .caption = "1 / sum of the squared weights, before resampling.",
                              .x = {"time", "s"},
                              .y = {"N_eff", ""},
-                             .x_values = r.time,
+                             .x_values = time,
                              .curves = {{"N_eff", Ink::belief, r.effective_size}}});
 }
 

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <mutex>
 #include <numbers>
 #include <utility>
 #include <vector>
@@ -32,6 +33,9 @@ using cairn::SE3;
 using cairn::SO3;
 using cairn::Vector;
 
+constexpr const char* truth_files =
+    "kitti_raw has them in poses_cam0_rectified.txt, kitti_odometry in poses.txt, euroc in "
+    "state_groundtruth_estimate0/";
 constexpr double pixel_sigma = 0.35;  // of an interest point of scale 1
 
 /// Interest points that both images of a frame have.
@@ -77,18 +81,58 @@ Landmarks landmarks_of(const stereo_slam::StereoFrame& frame, const cairn::Stere
   return found;
 }
 
-std::vector<Frame> frames_of(const stereo_slam::Dataset& data, const RecordedDriveOptions& options) {
+Frame frame_of(const stereo_slam::Dataset& data, std::size_t i, const GroundStereo& ground) {
+  const stereo_slam::StereoFrame images = data.frame(i);
+  if (!images.truth)
+    cairn::raise(images.name + std::string(" has no true pose, by which errors are measured: ") +
+                 truth_files);
+  const auto view = ground(images.left, images.right, i);
+  if (!view) cairn::raise(images.name + " shows no plane below the camera");
+  return {images.time, *images.truth, images.name, landmarks_of(images, data.rig()), *view};
+}
+
+/// The frames before the first that cannot be used, and why that is so.
+struct Frames {
+  std::vector<Frame> all;
+  std::optional<std::string> why_no_more;
+
+  void end_at(std::size_t count, const std::string& why) {
+    if (count < 2) cairn::raise(why);
+    all.resize(count);
+    why_no_more = why;
+  }
+};
+
+Frames frames_of(const stereo_slam::Dataset& data, const RecordedDriveOptions& options,
+                 const std::function<std::optional<std::string>()>& on_frame) {
   const GroundStereo ground(data.rig(), options.ground);
-  std::vector<Frame> frames(data.size());
-  cairn::parallel_for(frames.size(), options.threads, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const stereo_slam::StereoFrame images = data.frame(i);
-      if (!images.truth) cairn::raise("gamma_slam: " + images.name + " has no true pose");
-      const auto view = ground(images.left, images.right, i);
-      if (!view) cairn::raise("gamma_slam: " + images.name + " shows no plane below the camera");
-      frames[i] = {images.time, *images.truth, images.name, landmarks_of(images, data.rig()), *view};
+  Frames frames{std::vector<Frame>(data.size()), {}};
+  std::mutex one_at_a_time;  // for what follows
+  std::size_t good = data.size();
+  std::string why;
+  std::optional<std::string> interrupted;
+  const auto is_wanted = [&](std::size_t i) {
+    const std::lock_guard lock(one_at_a_time);
+    return i < good && !interrupted;
+  };
+  cairn::parallel_for(data.size(), options.threads, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end && is_wanted(i); ++i) {
+      std::string failed;
+      try {
+        frames.all[i] = frame_of(data, i, ground);
+      } catch (const cairn::Error& error) {
+        failed = error.what();
+      }
+      const std::lock_guard lock(one_at_a_time);
+      if (!failed.empty() && i < good) {
+        good = i;
+        why = failed;
+      }
+      if (on_frame && !interrupted) interrupted = on_frame();
     }
   });
+  if (interrupted) throw Interrupted(*interrupted);
+  if (good < data.size()) frames.end_at(good, why);
   return frames;
 }
 
@@ -107,10 +151,7 @@ cairn::StereoPose moved(const cairn::StereoRig& rig, const Frame& before, const 
                          .sigma_left = seen.sigma[m.query],
                          .sigma_right = seen.sigma[m.query]});
   }
-  cairn::StereoPose found = cairn::estimate_stereo_pose(rig, matches, {}, cairn::PosePrior{guess});
-  if (!found.good())
-    cairn::raise("gamma_slam: visual odometry failed at " + now.name + ": " + cairn::explain(found.status));
-  return found;
+  return cairn::estimate_stereo_pose(rig, matches, {}, cairn::PosePrior{guess});
 }
 
 /// The camera's motion as the vehicle's in the plane, both ends levelled by their ground.
@@ -166,12 +207,18 @@ std::shared_ptr<const stereo_slam::Dataset> opened_recording(const RecordedDrive
   which.frames = options.frames;
   which.threads = options.threads;
   std::shared_ptr<const stereo_slam::Dataset> data = stereo_slam::open_dataset(which);
-  if (data->size() < 2) cairn::raise("gamma_slam: expected a recording of at least two frames");
+  if (data->size() < 2) cairn::raise("expected a recording of at least two frames");
   return data;
 }
 
-Drive recorded_drive(const stereo_slam::Dataset& data, const RecordedDriveOptions& options) {
-  const std::vector<Frame> frames = frames_of(data, options);
+std::size_t frame_count(const stereo_slam::Dataset& data) {
+  return data.size();
+}
+
+Drive recorded_drive(const stereo_slam::Dataset& data, const RecordedDriveOptions& options,
+                     const std::function<std::optional<std::string>()>& on_frame) {
+  Frames found = frames_of(data, options, on_frame);
+  const std::vector<Frame>& frames = found.all;
   Drive drive;
   drive.name = data.name() + ", there and back";
   const auto add = [&](std::size_t frame, TerrainScan scan, double time, bool back) {
@@ -186,12 +233,20 @@ Drive recorded_drive(const stereo_slam::Dataset& data, const RecordedDriveOption
   add(0, {}, frames[0].time, false);
   for (std::size_t i = 1; i < frames.size(); ++i) {
     const cairn::StereoPose pose = moved(data.rig(), frames[i - 1], frames[i], guess);
+    if (!pose.good()) {
+      found.end_at(i, "visual odometry failed at " + frames[i].name + ": " + cairn::explain(pose.status));
+      break;
+    }
     guess = pose.T_world_camera;
     steps.push_back(step_of(pose, frames[i - 1].ground, frames[i].ground));
     TerrainScan scan = steps.back();
     perturb(scan, options.noise, random);
     add(i, std::move(scan), frames[i].time, false);
   }
+  if (found.why_no_more)
+    drive.ended_early = "ended after " + std::to_string(frames.size()) + " of " +
+                        std::to_string(data.size()) +
+                        " frames, and driven back from there: " + *found.why_no_more;
   const double turn = frames.back().time;
   for (std::size_t i = frames.size() - 1; i-- > 0;) {
     TerrainScan scan = steps[i];

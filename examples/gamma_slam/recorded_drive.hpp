@@ -14,7 +14,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
+#include <optional>
+#include <stdexcept>
 #include <string>
 
 #include "drive.hpp"
@@ -48,8 +51,18 @@ struct RecordedDriveOptions {
 [[nodiscard]] std::shared_ptr<const stereo_slam::Dataset> opened_recording(
     const RecordedDriveOptions& options);
 
-/// Throws cairn::Error where an image cannot be read, odometry fails, no ground is seen or a frame has no
-/// true pose.
-[[nodiscard]] Drive recorded_drive(const stereo_slam::Dataset& data, const RecordedDriveOptions& options);
+[[nodiscard]] std::size_t frame_count(const stereo_slam::Dataset& data);
+
+/// What an interrupted preparation throws.
+class Interrupted : public std::runtime_error {
+public:
+  using std::runtime_error::runtime_error;
+};
+
+/// The drive ends, and turns back, before the first frame that cannot be read, shows no ground, has no true
+/// pose or where odometry fails; throws cairn::Error where that leaves less than two. `on_frame` is called
+/// after every frame, by one thread at a time; what it returns, if anything, is thrown as Interrupted.
+[[nodiscard]] Drive recorded_drive(const stereo_slam::Dataset& data, const RecordedDriveOptions& options,
+                                   const std::function<std::optional<std::string>()>& on_frame = {});
 
 }  // namespace gamma_slam

@@ -124,7 +124,7 @@ void map_drive(Results& r, const Drive& drive, const std::function<std::optional
     const cairn::FromMotion proposal{.draws = wide ? options.draws : 1};
     const cairn::MappingStep step = filter.step(belief, motion, proposal, scan);
     if (!step.accepted())
-      cairn::raise("gamma_slam: scan " + std::to_string(r.scans) + ": " + cairn::explain(step.status));
+      cairn::raise("scan " + std::to_string(r.scans) + ": " + cairn::explain(step.status));
     r.resampled += step.resampled;
     r.effective_size.push_back(step.effective_size);
     r.time.push_back(scan.time);
@@ -173,7 +173,7 @@ double Results::end_error(const std::vector<SE2>& poses) const {
 Results run(const Drive& drive, const RunOptions& options,
             const std::function<std::optional<std::string>()>& on_scan) {
   if (options.particles == 0 || options.draws == 0)
-    cairn::raise("gamma_slam: expected at least one particle and one draw");
+    cairn::raise("expected at least one particle and one draw");
   Results r;
   r.options = options;
   r.drive = drive.name;
@@ -182,6 +182,7 @@ Results run(const Drive& drive, const RunOptions& options,
     map_drive<cairn::HeightCell>(r, drive, on_scan);
   else
     map_drive<cairn::VarianceCell>(r, drive, on_scan);
+  if (!r.ended_early) r.ended_early = drive.ended_early;
   r.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return r;
 }

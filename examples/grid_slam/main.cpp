@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: MIT
 //
 // Grid SLAM: a Rao-Blackwellised particle filter over occupancy grids, from a CARMEN log or a rendered drive.
-// Exit codes: 0 well; 2 a mistake; 4 interrupted, the results are of the scans before.
+// Exit codes: 0 well; 2 a mistake; 3 a scan could not be mapped, 4 interrupted, the results are of the scans
+// before.
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
@@ -208,10 +209,13 @@ int main(int argc, char** argv) {
     Results results =
         options.map == Maps::tiles ? map_occupancy(options, input, mapper) : map_stops(options, input);
     results.name = input.name;
+    if (results.data_ended) *results.ended_early = input.name + ": " + *results.ended_early;
     if (results.ended_early) std::cerr << name << ": " << *results.ended_early << '\n';
+    for (const std::string& note : results.notes) std::cerr << name << ": " << note << '\n';
     if (const auto no_report = write_outputs(results, options.out)) std::cout << *no_report << '\n';
     if (mapper && !options.save.empty()) mapper->save(options.save);
     print(results, options.out);
+    if (results.data_ended) return example::exit_data_ended;
     return results.ended_early ? example::exit_interrupted : example::exit_well;
   });
 }

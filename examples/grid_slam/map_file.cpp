@@ -242,8 +242,8 @@ void Mapper::expect_sound(const Reader& reader) const {
 }
 
 void Mapper::save(const std::filesystem::path& path) const {
-  if (!belief_) cairn::raise("grid_slam: a map without a scan is not saved");
-  if (frozen_) cairn::raise("grid_slam: a map that is only localised in is not saved again");
+  if (!belief_) cairn::raise("a map without a scan is not saved");
+  if (frozen_) cairn::raise("a map that is only localised in is not saved again");
   Mapper copy = *this;  // the archive's functions serve reading too, so they want what may be changed
   MapperOptions& options = copy.options_;
   cairn::PathsRecord<cairn::SE2> record = belief_->record();

@@ -6,13 +6,14 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstdio>
 #include <limits>
 #include <string>
 #include <vector>
 
-#include <cairn/core/check.hpp>
 #include <cairn/grid/tile.hpp>
 #include <cairn/vision/image.hpp>
 
@@ -25,7 +26,27 @@ struct MapImage {
   cairn::Image image;
   double cell_size = 0;         ///< [m] a pixel
   double left = 0, bottom = 0;  ///< of the lower left pixel's lower left corner [m]
+  /// Of the map [cells]. Where one is above `most`, there is no picture: `image` is empty.
+  std::int64_t columns = image.width(), rows = image.height();
+
+  static constexpr int most = 30000;
+  [[nodiscard]] bool has_picture() const noexcept { return image.width() > 0; }
 };
+
+/// Why a map has no picture, and what there is to do.
+[[nodiscard]] inline std::string why_no_picture(const MapImage& map) {
+  const double needed = map.cell_size * static_cast<double>(std::max(map.columns, map.rows)) / MapImage::most;
+  constexpr double coarsest = 1;  // [m], of --resolution
+  char advice[96];
+  if (needed < coarsest)
+    std::snprintf(advice, sizeof advice, "--resolution %.2f makes it small enough",
+                  std::min(coarsest, std::ceil(100 * needed + 1) / 100));
+  else
+    std::snprintf(advice, sizeof advice, "no --resolution makes it small enough, is the odometry right?");
+  return "no map.pgm and map.yaml: the map of " + std::to_string(map.columns) + " x " +
+         std::to_string(map.rows) + " cells is larger than a picture of " + std::to_string(MapImage::most) +
+         " x " + std::to_string(MapImage::most) + "; " + advice;
+}
 
 /// A map as runs of equal pixels, row by row: a floor of a million cells in a tenth of the bytes or less, so
 /// that the maps of a film can be kept while the filter still runs.
@@ -64,6 +85,7 @@ public:
       }
     return map;
   }
+  [[nodiscard]] bool has_picture() const noexcept { return width > 0; }
   [[nodiscard]] std::size_t bytes() const noexcept { return runs_.capacity() * sizeof(Run); }
 
 private:
@@ -76,7 +98,7 @@ private:
 };
 
 /// Of all cells of shared tiles, or of a tree of ancestors, whose grey(cell) is not unknown, with a margin of
-/// one; one unknown pixel where there is none. Throws cairn::Error where the picture would be too large.
+/// one; one unknown pixel where there is none. No picture where it would be too large.
 template <class Cells, class Grey>
 [[nodiscard]] MapImage image_of(const cairn::GridGeometry& geometry, const Cells& cells, const Grey& grey) {
   using cairn::CellAddress;
@@ -98,12 +120,14 @@ template <class Cells, class Grey>
   low = {low.column - 1, low.row - 1};
   const auto width = static_cast<std::int64_t>(high.column) + 2 - low.column;
   const auto height = static_cast<std::int64_t>(high.row) + 2 - low.row;
-  if (width > 30000 || height > 30000)
-    cairn::raise("the map of " + std::to_string(width) + " x " + std::to_string(height) +
-                 " cells is larger than a picture of 30000 x 30000");
-  MapImage map{cairn::Image(static_cast<int>(width), static_cast<int>(height), unknown_grey),
-               geometry.cell_size, geometry.origin_x + low.column * geometry.cell_size,
-               geometry.origin_y + low.row * geometry.cell_size};
+  MapImage map{{},
+               geometry.cell_size,
+               geometry.origin_x + low.column * geometry.cell_size,
+               geometry.origin_y + low.row * geometry.cell_size,
+               width,
+               height};
+  if (width > MapImage::most || height > MapImage::most) return map;
+  map.image = cairn::Image(static_cast<int>(width), static_cast<int>(height), unknown_grey);
   for_each_known([&](CellAddress at, std::uint8_t g) {
     map.image(at.column - low.column, static_cast<int>(height) - 1 - (at.row - low.row)) = g;
   });

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
+#include <exception>
 #include <functional>
 #include <numbers>
 #include <string>
@@ -20,6 +22,7 @@
 #include <cairn/scan/match.hpp>
 
 #include "filled_path.hpp"
+#include "room.hpp"
 
 namespace grid_slam {
 
@@ -111,6 +114,8 @@ cairn::Gaussian<SE2> Mapper::newest() const {
 }
 
 bool Mapper::add(const cairn::StampedScan& scan) {
+  const Motion before = motion_;
+  const std::size_t steps = steps_.size();
   bool due = scans_.empty();
   if (due) {
     begin(scan);
@@ -124,7 +129,16 @@ bool Mapper::add(const cairn::StampedScan& scan) {
     if (!due && stands) motion_.stood = true;
   }
   scans_.push_back(scan);
-  if (due) process(scan);
+  try {
+    if (due) process(scan);
+  } catch (const std::exception&) {
+    if (steps_.size() == steps) {  // the belief does not know of the scan
+      scans_.pop_back();
+      points_.resize(steps);
+      motion_ = before;
+    }
+    throw;
+  }
   return due;
 }
 
@@ -155,8 +169,7 @@ Mapper Mapper::localiser(const std::filesystem::path& path, const MapRequest& wa
   const PlaceWindow& w = *window;
   if (!(w.left < w.right && w.bottom < w.top) || !std::isfinite(w.right - w.left) ||
       !std::isfinite(w.top - w.bottom))
-    cairn::raise(
-        "grid_slam: expected a window whose left is below its right, and whose bottom is below its top");
+    cairn::raise("expected a window whose left is below its right, and whose bottom is below its top");
   bool known = false;
   const cairn::GridGeometry& geometry = mapper.frozen_->grid.geometry();
   mapper.frozen_->grid.cells().for_each_tile([&](cairn::TileAddress address, const auto& tile) {
@@ -168,7 +181,7 @@ Mapper Mapper::localiser(const std::filesystem::path& path, const MapRequest& wa
                         w.bottom < y && y < w.top);
     }
   });
-  if (!known) cairn::raise("grid_slam: the window lies outside of the map");
+  if (!known) cairn::raise("the window lies outside of the map");
   return mapper;
 }
 
@@ -184,7 +197,7 @@ cairn::Gaussian<SE2> Mapper::place_in_window(const cairn::StampedScan& scan) {
   const auto found =
       search.find_places(cairn::thinned(near, 0.2), SE2(x, y, 0), {half_x, half_y, std::numbers::pi}, 4, {},
                          options_.loops.enough_score);
-  if (found.empty()) cairn::raise("grid_slam: no place in the window explains the first scan");
+  if (found.empty()) cairn::raise("no place in the window explains the first scan");
   const Matrix<3> floor = Vector<3>(0.0025, 0.0025, 0.0004).asDiagonal();
   std::vector<cairn::Gaussian<SE2>> starts;
   std::vector<double> evidence;
@@ -282,9 +295,18 @@ void Mapper::process(const cairn::StampedScan& scan) {
                                         .insert = !frozen_.has_value(),
                                         .seed = options_.seed,
                                         .threads = options_.threads};
-  const cairn::MappingStep step = filter.step(*belief_, motion, proposal, points_.back());
-  if (!step.accepted())
-    cairn::raise("grid_slam: scan " + std::to_string(index) + ": " + cairn::explain(step.status));
+  std::atomic<bool> all_have_room = true;
+  const auto with_room = [&](const OccupancyMap& map, const cairn::RegimeMotion<SE2>& moved,
+                             const OccupancyMap::Observation& z, cairn::Random& random) {
+    cairn::Proposed<SE2> proposed = proposal(map, moved, z, random);
+    if (!frozen_ && !map.has_room_for(proposed.pose, z)) {
+      forbid(proposed);
+      all_have_room = false;
+    }
+    return proposed;
+  };
+  const cairn::MappingStep step = filter.step(*belief_, motion, with_room, points_.back());
+  if (!step.accepted()) refuse_step(step.status, all_have_room, options_.cell_size);
   if (!first) learn_delay(noise);
   travelled_.push_back(travelled_.back() + motion_.distance);
   steps_.push_back({index, step.effective_size, step.resampled, false, belief_->pose()});

@@ -146,7 +146,7 @@ public:
   void save(const std::filesystem::path& path) const;
 
   /// The next scan of the log. Returns whether it was processed. Throws cairn::Error where the filter refuses
-  /// the step, naming why.
+  /// the step or the map cannot reach so far, naming why; but for the first scan's, all is then as it was.
   bool add(const cairn::StampedScan& scan);
 
   [[nodiscard]] const MapperOptions& options() const noexcept { return options_; }

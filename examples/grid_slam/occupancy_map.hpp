@@ -30,6 +30,8 @@
 #include <cairn/scan/occupancy_grid.hpp>
 #include <cairn/scan/scan.hpp>
 
+#include "room.hpp"
+
 namespace grid_slam {
 
 /// ConditionalMap over occupancy grids. The pose is the laser's, the observation its end points.
@@ -43,7 +45,15 @@ struct OccupancyMap {
   [[nodiscard]] double log_likelihood(const Pose& x, const Observation& z) const {
     return cairn::log_likelihood(grid, z, x, model);
   }
-  void insert(const Pose& x, const Observation& z) { grid.insert(x, z); }
+  /// Nothing where there is no room for it.
+  void insert(const Pose& x, const Observation& z) {
+    if (has_room_for(x, z)) grid.insert(x, z);
+  }
+  [[nodiscard]] bool has_room_for(const Pose& x, const Observation& z) const {
+    double reach = 0;
+    for (const cairn::ScanPoint& p : z) reach = std::max(reach, std::hypot(p.x, p.y));
+    return has_room(grid.geometry(), grid.cells(), x, reach);
+  }
 };
 
 /// Draws from a Gaussian fitted to likelihood times motion around their best pose: several poses, of which

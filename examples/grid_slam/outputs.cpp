@@ -166,7 +166,9 @@ void add_map(example::Report& page, const Results& r) {
 /// The map as it grew.
 void add_film(example::Report& page, const Results& r) {
   std::vector<Extent> maps;
-  for (const Snapshot& s : r.snapshots) maps.push_back(extent_of(s.map));
+  for (const Snapshot& s : r.snapshots)
+    if (s.map.has_picture()) maps.push_back(extent_of(s.map));
+  if (maps.empty()) return;
   const Canvas canvas = canvas_of(maps);
   example::PictureFilm film{.title = "The map as it grew",
                             .caption = "The map of the particle that was best at each time, " +
@@ -178,6 +180,7 @@ void add_film(example::Report& page, const Results& r) {
                             .height = canvas.height,
                             .wide = true};
   for (const Snapshot& s : r.snapshots) {
+    if (!s.map.has_picture()) continue;
     example::Marks all = marked("all particles' paths", Ink::violet), best = marked("best path", Ink::belief);
     for (const auto& [from, to] : s.paths) add_step(all, canvas, from, to);
     for (std::size_t k = 1; k < s.best.size(); ++k) add_step(best, canvas, s.best[k - 1], s.best[k]);
@@ -314,6 +317,7 @@ std::string summary(const Results& r) {
           {{"x_m", p.pose.x()}, {"y_m", p.pose.y()}, {"heading_rad", p.pose.angle()}, {"share", p.share}});
   }
   json["ended_early"] = r.ended_early ? Json(*r.ended_early) : Json(nullptr);
+  json["notes"] = r.notes;
   const auto& p = r.newest.covariance;
   json["newest_pose"] = {
       {"x_m", r.newest.mean.x()},
@@ -322,8 +326,8 @@ std::string summary(const Results& r) {
       {"covariance",
        {{p(0, 0), p(0, 1), p(0, 2)}, {p(1, 0), p(1, 1), p(1, 2)}, {p(2, 0), p(2, 1), p(2, 2)}}}};
   json["scan_delay"] = {{"scans", r.delay}, {"standard_deviation", r.delay_spread}};
-  json["map"] = {{"width", r.map.image.width()},
-                 {"height", r.map.image.height()},
+  json["map"] = {{"width", r.map.columns},
+                 {"height", r.map.rows},
                  {"resolution_m", r.map.cell_size},
                  {"bytes_of_all_particles", r.bytes}};
   json["relations"] = {{"odometry", json_of(r.of_odometry)},
@@ -337,6 +341,7 @@ std::optional<std::string> report(const Results& r) {
   example::Report page("Grid SLAM", r.name + ", " + std::to_string(r.particles) + " particles, seed " +
                                         std::to_string(r.seed));
   if (r.ended_early) page.note(*r.ended_early);
+  for (const std::string& note : r.notes) page.note(note);
   page.figure({"Scans", std::to_string(r.scans), "", std::to_string(r.steps.size()) + " processed"});
   page.figure({"Loops", std::to_string(r.loops.size()), "", "relative poses measured at revisits"});
   if (r.of_means && r.of_means->count > 0)
@@ -345,7 +350,7 @@ std::optional<std::string> report(const Results& r) {
          readable(r.of_means->mean_angle * degrees) + " deg; mean over the pairs whose truth is known"});
   page.figure({"Maps of all particles", readable(static_cast<double>(r.bytes) / 1048576.0), "MB"});
 #ifdef EXAMPLES_HAVE_PNG
-  if (r.snapshots.empty())
+  if (r.snapshots.empty() && r.map.has_picture())
     add_map(page, r);
   else
     add_film(page, r);
@@ -370,8 +375,10 @@ std::optional<std::string> write_outputs(const Results& r, const std::filesystem
   const std::optional<std::string> page = report(r);
   Json timing{{"threads", r.threads}, {"seconds", r.seconds}, {"cpu_seconds", r.cpu_seconds}};
   results_in(folder).replace([&](const std::filesystem::path& staging) {
-    cairn::write_pgm(staging / "map.pgm", r.map.image);
-    cairn::write_file_atomically(staging / "map.yaml", yaml(r.map));
+    if (r.map.has_picture()) {
+      cairn::write_pgm(staging / "map.pgm", r.map.image);
+      cairn::write_file_atomically(staging / "map.yaml", yaml(r.map));
+    }
     cairn::write_file_atomically(staging / "trajectory.txt", tum(r.means));
     cairn::write_file_atomically(staging / "summary.json", summary(r));
     cairn::write_file_atomically(staging / "timing.json", timing.dump(2) + "\n");

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: MIT
 //
 /// @file
-/// What grid_slam leaves in its folder: map.pgm and map.yaml (ROS map_server's), trajectory.txt (TUM),
-/// summary.json, report.html, timing.json. All but the last are the same bytes for the same log, options and
-/// seed, whatever the number of threads.
+/// What grid_slam leaves in its folder: map.pgm and map.yaml (ROS map_server's; neither where the map is too
+/// large for a picture), trajectory.txt (TUM), summary.json, report.html, timing.json. All but the last are
+/// the same bytes for the same log, options and seed, whatever the number of threads.
 #pragma once
 
 #include <array>
@@ -59,11 +59,13 @@ struct Results {
   std::vector<std::vector<cairn::SE2>> paths;  ///< of all particles
   std::vector<Snapshot> snapshots;             ///< in their order, if any were asked for
   std::optional<std::string> ended_early;
+  bool data_ended = false;         ///< by the log, not from outside
+  std::vector<std::string> notes;  ///< what the reader should know of these results
   unsigned threads = 1;
   double seconds = 0, cpu_seconds = 0;
 };
 
-/// Puts the errors by relations in, where there are any.
+/// Puts the errors by relations in, where there are any, and a note where the path lacks times of theirs.
 void measure(Results& results, const std::vector<cairn::PoseRelation>& relations);
 
 [[nodiscard]] std::string summary(const Results& results);

@@ -2,8 +2,14 @@
 // SPDX-License-Identifier: MIT
 #include "run.hpp"
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <ctime>
+#include <exception>
+
+#include <cairn/io/text.hpp>
+#include <cairn/scan/scan.hpp>
 
 #include "filled_path.hpp"
 
@@ -15,6 +21,33 @@ void measure(Results& r, const std::vector<cairn::PoseRelation>& relations) {
   r.of_drawn = cairn::relation_error(r.drawn, relations);
   r.of_means = cairn::relation_error(r.means, relations);
   r.of_rematched = cairn::relation_error(r.rematched, relations);
+  const std::size_t missing = r.of_means->missing;
+  if (missing == relations.size())
+    r.notes.push_back("none of the " + std::to_string(missing) +
+                      " relations has poses of the path at both of its times: are they of this log?");
+  else if (missing > 0)
+    r.notes.push_back(std::to_string(missing) + " of " + std::to_string(relations.size()) +
+                      " relations have no pose of the path at one of their times");
+}
+
+void end_of_data(Results& r, const cairn::CarmenLog& log, std::size_t next, const std::string& why) {
+  r.data_ended = true;
+  std::string where = "scan " + std::to_string(next + 1) + " (time " + cairn::shortest(log.scans[next].time);
+  if (next > 0)
+    where += ", by odometry " +
+             cairn::shortest(std::round(
+                 (log.scans[next].T_odom_laser.translation() - log.scans[next - 1].T_odom_laser.translation())
+                     .norm())) +
+             " m from the one before";
+  r.ended_early = "ended after " + std::to_string(next) + " of " + std::to_string(log.scans.size()) +
+                  " scans: " + where + "): " + why;
+}
+
+void add_notes(Results& r, const std::vector<cairn::StampedScan>& scans) {
+  if (!r.map.has_picture()) r.notes.push_back(why_no_picture(r.map));
+  if (std::ranges::all_of(scans, [](const auto& each) { return cairn::scan_points(each.scan).empty(); }))
+    r.notes.emplace_back(
+        "no scan has a beam that came back: the map is empty, and the path is drawn from odometry alone");
 }
 
 Results run(Mapper& mapper, const cairn::CarmenLog& log, const std::vector<cairn::PoseRelation>& relations,
@@ -26,8 +59,15 @@ Results run(Mapper& mapper, const cairn::CarmenLog& log, const std::vector<cairn
   const auto begin = std::chrono::steady_clock::now();
   const std::clock_t cpu = std::clock();
   const std::size_t count = log.scans.size();
+  const std::size_t begun = mapper.scans().size();
   for (std::size_t i = 0; i < count; ++i) {
-    mapper.add(log.scans[i]);
+    try {
+      mapper.add(log.scans[i]);
+    } catch (const std::exception& error) {
+      if (mapper.scans().size() == begun) throw;
+      end_of_data(r, log, i, error.what());
+      break;
+    }
     if (on_scan) r.ended_early = on_scan();
     if (r.ended_early) break;
     if ((i + 1) * frames / count != i * frames / count && i + 1 < count)
@@ -55,6 +95,7 @@ Results run(Mapper& mapper, const cairn::CarmenLog& log, const std::vector<cairn
     for (const auto& pose : mapper.belief().path(i)) path.push_back(pose.pose);
   }
   measure(r, relations);
+  add_notes(r, mapper.scans());
   return r;
 }
 

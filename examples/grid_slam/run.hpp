@@ -20,7 +20,7 @@ namespace grid_slam {
 
 /// Lets the mapper take the log. `on_scan` is called after every scan; what it returns, if anything, ends the
 /// run and says why. Relations may be none. `frames` is how often a snapshot is taken, over the log and at
-/// its end. Throws cairn::Error where the log cannot be mapped.
+/// its end. A scan that cannot be mapped ends the run as well; throws cairn::Error where it is the first.
 [[nodiscard]] Results run(Mapper& mapper, const cairn::CarmenLog& log,
                           const std::vector<cairn::PoseRelation>& relations,
                           const std::function<std::optional<std::string>()>& on_scan = {},
@@ -30,5 +30,10 @@ namespace grid_slam {
 [[nodiscard]] Results run(const cairn::CarmenLog& log, const MapperOptions& options,
                           const std::vector<cairn::PoseRelation>& relations,
                           const std::function<std::optional<std::string>()>& on_scan = {});
+
+/// Ends a run at scan `next` of the log, which could not be mapped, and says which that is.
+void end_of_data(Results& results, const cairn::CarmenLog& log, std::size_t next, const std::string& why);
+/// What a reader of the results should know: a map without a picture, scans without beams.
+void add_notes(Results& results, const std::vector<cairn::StampedScan>& scans);
 
 }  // namespace grid_slam

@@ -3,9 +3,11 @@
 #include "stop_mapper.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <exception>
 #include <set>
 
 #include <cairn/core/check.hpp>
@@ -15,6 +17,8 @@
 
 #include "filled_path.hpp"
 #include "map_image.hpp"
+#include "room.hpp"
+#include "run.hpp"
 
 namespace grid_slam {
 
@@ -37,7 +41,14 @@ struct StopMap {
   [[nodiscard]] double log_likelihood(const Pose& x, const Observation& z) const {
     return grid.log_likelihood(z, x);
   }
-  void insert(const Pose& x, const Observation& z) { grid.insert(z, x); }
+  /// Nothing where there is no room for it.
+  void insert(const Pose& x, const Observation& z) {
+    if (has_room_for(x, z)) grid.insert(z, x);
+  }
+
+  [[nodiscard]] bool has_room_for(const Pose& x, const Observation& z) const {
+    return has_room(grid.options().geometry, grid.cells(), x, z.farthest);
+  }
 
   /// For many draws from near one pose.
   struct Prepared {
@@ -72,6 +83,10 @@ struct MatchedStopMap {
   void insert(const Pose& x, const Observation& z) {
     stop_map.insert(x, z.scan);
     occupancy.insert(x, z.points);
+  }
+
+  [[nodiscard]] bool has_room_for(const Pose& x, const Observation& z) const {
+    return stop_map.has_room_for(x, z.scan) && occupancy.has_room_for(x, z.points);
   }
 
   /// Draws where the occupancy says, and weighs by the stops: the weight is exact for any density that single
@@ -134,8 +149,14 @@ public:
       due = distance_ >= options_.step_distance || angle_ >= options_.step_angle;
     }
     scans_.push_back(scan);
-    if (due) process(scan);
+    try {
+      if (due) process(scan);
+    } catch (const std::exception&) {  // the belief does not know of the scan
+      scans_.pop_back();
+      throw;
+    }
   }
+  [[nodiscard]] const std::vector<cairn::StampedScan>& scans() const { return scans_; }
 
   void put_into(Results& r) const {
     r.steps = steps_;
@@ -180,12 +201,20 @@ private:
     const cairn::ConditionalFilter filter{
         .resample_below = options_.resample_below, .seed = options_.seed, .threads = options_.threads};
     const auto motion = [&](const SE2& x, std::size_t) { return Gaussian<SE2>{x * moved_, noise}; };
-    const cairn::MappingStep step =
-        filter.step(belief_, motion, Map::proposal(options_), Map::observed(scan.scan));
-    const std::size_t index = scans_.size() - 1;
-    if (!step.accepted())
-      cairn::raise("grid_slam: scan " + std::to_string(index) + ": " + cairn::explain(step.status));
-    steps_.push_back({index, step.effective_size, step.resampled, false, belief_.pose()});
+    std::atomic<bool> all_have_room = true;
+    const auto propose = Map::proposal(options_);
+    const auto with_room = [&](const Map& map, const Gaussian<SE2>& moved, const typename Map::Observation& z,
+                               cairn::Random& random) {
+      cairn::Proposed<SE2> proposed = propose(map, moved, z, random);
+      if (!map.has_room_for(proposed.pose, z)) {
+        forbid(proposed);
+        all_have_room = false;
+      }
+      return proposed;
+    };
+    const cairn::MappingStep step = filter.step(belief_, motion, with_room, Map::observed(scan.scan));
+    if (!step.accepted()) refuse_step(step.status, all_have_room, options_.map.geometry.cell_size);
+    steps_.push_back({scans_.size() - 1, step.effective_size, step.resampled, false, belief_.pose()});
     moved_ = SE2();
     distance_ = angle_ = 0;
   }
@@ -205,13 +234,20 @@ void map_log(Results& r, const cairn::CarmenLog& log, const StopMapperOptions& o
   const std::clock_t cpu = std::clock();
   StopMapper<Map> mapper(log.scans.front().T_odom_laser, options);
   for (const cairn::StampedScan& scan : log.scans) {
-    mapper.add(scan);
+    try {
+      mapper.add(scan);
+    } catch (const std::exception& error) {
+      if (mapper.scans().empty()) throw;
+      end_of_data(r, log, mapper.scans().size(), error.what());
+      break;
+    }
     if (on_scan) r.ended_early = on_scan();
     if (r.ended_early) break;
   }
   r.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   r.cpu_seconds = static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC;
   mapper.put_into(r);
+  add_notes(r, mapper.scans());
 }
 
 }  // namespace
@@ -230,8 +266,8 @@ StopMapperOptions matching_stops() {
 
 Results run_stop_mapper(const cairn::CarmenLog& log, const StopMapperOptions& options,
                         const std::vector<cairn::PoseRelation>& relations, const OnScan& on_scan) {
-  if (log.scans.empty()) cairn::raise("grid_slam: expected a log with a scan");
-  if (options.draws == 0) cairn::raise("grid_slam: expected at least one draw a particle");
+  if (log.scans.empty()) cairn::raise("expected a log with a scan");
+  if (options.draws == 0) cairn::raise("expected at least one draw a particle");
   Results r;
   r.seed = options.seed;
   r.particles = options.particles;

@@ -17,6 +17,7 @@
 #include <cairn/io/trajectory.hpp>
 #include <cairn/version.hpp>
 
+#include "support/data.hpp"
 #include "support/folder.hpp"
 #include "support/report.hpp"
 
@@ -96,6 +97,43 @@ TEST_SUITE("gamma_slam/program") {
     const auto summary = nlohmann::json::parse(cairn::read_file(folder / "out" / "summary.json"));
     CHECK(summary["ended_early"].get<std::string>().find("interrupted (SIGTERM)") == 0);
   }
+
+#ifdef GAMMA_SLAM_HAS_RECORDINGS
+  TEST_CASE("gamma_slam: a recording is prepared under the user's eyes, up to what of it can be used") {
+    const auto data = cairn_test::real_data("kitti_raw_0926");
+    if (!data) return;
+    const cairn_test::Folder folder;
+    const fs::path copy = folder / "drive";
+    fs::copy(*data, copy, fs::copy_options::recursive);
+    const auto drive = [&](const std::string& more) {
+      return run("--particles 2 --drive \"" + copy.string() + "\" --out \"" + (folder / "out").string() +
+                 "\" --frames " + more);
+    };
+    const fs::path image = copy / "image_01" / "data" / "0000000006.png";
+    fs::remove(image);
+    folder.put("drive/image_01/data/0000000006.png", "no image");
+    const Outcome damaged = drive("6 --threads 2");
+    CAPTURE(damaged.words);
+    CHECK(damaged.code == 3);
+    CHECK(damaged.says("frames  50 %"));
+    CHECK(damaged.says("gamma_slam: ended after 4 of 6 frames, and driven back from there: "));
+    CHECK(damaged.says("0000000006.png"));
+    CHECK(names_in(folder / "out") == results());
+    CHECK(nlohmann::json::parse(cairn::read_file(folder / "out" / "summary.json"))["scans"] == 7);
+    CHECK(cairn_test::interrupt_program({program, "--drive", data->string(), "--frames", "40", "--out",
+                                         (folder / "interrupted").string()},
+                                        {SIGINT}, 1) == 4);
+    CHECK(names_in(folder / "interrupted").empty());
+    fs::remove_all(copy / "poses_cam0_rectified.txt");
+    const Outcome untrue = drive("3");
+    CAPTURE(untrue.words);
+    CHECK(untrue.code == 2);
+    CHECK(untrue.says("true pose"));
+    CHECK(untrue.says("poses_cam0_rectified.txt"));
+    CHECK_FALSE(untrue.says("gamma_slam: gamma_slam"));
+    CHECK(run("--help").says("true poses"));
+  }
+#endif
 }
 
 }  // namespace gamma_program_test

@@ -13,6 +13,7 @@
 
 #include "drive.hpp"
 #include "elevation_map.hpp"
+#include "outputs.hpp"
 #include "support/folder.hpp"
 
 namespace gamma_run_test {
@@ -141,6 +142,17 @@ TEST_SUITE("gamma_slam/run") {
     CHECK(r.coverage->share() > 0.80);
     CHECK(r.coverage->share() < 0.97);
     CHECK(r.path.size() == drive.scans.size());
+  }
+
+  TEST_CASE("gamma_slam: the report counts time from the start, whenever that was") {
+    Drive drive = simulated_drive({.seed = 1, .laps = 1});
+    drive.scans.resize(20);
+    const auto page = [&](double start) {
+      for (std::size_t i = 0; i < drive.scans.size(); ++i)
+        drive.scans[i].time = start + static_cast<double>(i);
+      return report(run(drive, {.particles = 2}));
+    };
+    CHECK(page(0) == page(1316995044));
   }
 
   TEST_CASE("gamma_slam: the same numbers for 1, 2 and 7 threads, for either kind of cell") {

@@ -137,6 +137,20 @@ TEST_SUITE("grid/shared_tiles") {
     CHECK(grid.read({farthest_cell, 0}) == 0);
   }
 
+  TEST_CASE("shared_tiles: has_room says what write would refuse") {
+    SharedTiles<int> grid;
+    CHECK(grid.has_room({0, 0}, {65535, 65535}));
+    CHECK_FALSE(grid.has_room({0, 0}, {65536, 0}));
+    CHECK_FALSE(grid.has_room({0, -1}, {0, 65535}));
+    grid.write({0, 0}) = 1;
+    for (const std::int32_t column : {-65521, -65520, -1, 0, 65535, 65536}) {
+      SharedTiles<int> copy = grid;
+      const std::string words = cairn_test::message_of([&] { copy.write(corner_of({column, 3})) = 2; });
+      CAPTURE(column);
+      CHECK(grid.has_room({column, 3}, {column, 3}) == words.empty());
+    }
+  }
+
   TEST_CASE("shared_tiles: copies may be written from several threads at once") {
     SharedTiles<int> base;
     for (int i = 0; i < 64; ++i) base.write({i * tile_side, 0}) = 1;

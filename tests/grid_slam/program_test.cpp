@@ -36,8 +36,9 @@ std::set<std::string> results() {
   return cairn_test::with_report({"map.pgm", "map.yaml", "trajectory.txt", "summary.json", "timing.json"});
 }
 
-/// The first scans of a rendered drive as a CARMEN log.
-std::string short_log(std::size_t scans) {
+/// The first scans of a rendered drive as a CARMEN log; at scan `jump` odometry is elsewhere, by so many
+/// metres.
+std::string short_log(std::size_t scans, std::size_t jump = 0, double by = 0) {
   const grid_slam::Drive drive = grid_slam::simulated_drive({.seed = 3});
   std::string text;
   for (std::size_t i = 0; i < scans; ++i) {
@@ -45,7 +46,8 @@ std::string short_log(std::size_t scans) {
     text += "FLASER " + std::to_string(s.scan.size());
     for (const float r : s.scan.range) text += " " + cairn::shortest(r);
     for (int twice = 0; twice < 2; ++twice)
-      for (const double n : {s.T_odom_laser.x(), s.T_odom_laser.y(), s.T_odom_laser.angle()})
+      for (const double n : {s.T_odom_laser.x() + (jump > 0 && i == jump ? by : 0), s.T_odom_laser.y(),
+                             s.T_odom_laser.angle()})
         text += " " + cairn::shortest(n);
     text += " " + cairn::shortest(s.time) + " host 0\n";
   }
@@ -208,6 +210,86 @@ TEST_SUITE("grid_slam/program") {
     CHECK(run("--load " + named("torn") + with_log).says("bytes after the head, expected"));
     CHECK(run("--load " + named("map") + " --localise --window 500 500 510 510" + with_log)
               .says("outside of the map"));
+  }
+
+  TEST_CASE("grid_slam: a map too large for a picture is left out with a note, and nothing else is") {
+    const cairn_test::Folder folder;
+    folder.put("log", short_log(40, 39, 2000));
+    const auto named = [&](const char* name) { return "\"" + (folder / name).string() + "\""; };
+    const std::string arguments =
+        "--particles 1 --log " + named("log") + " --out " + named("out") + " --save " + named("map");
+    for (const std::string way : {"", "--map stop ", "--map ancestry "}) {
+      const Outcome outcome =
+          run(way + (way.empty() ? arguments : arguments.substr(0, arguments.find(" --save"))));
+      CAPTURE(outcome.words);
+      CHECK(outcome.code == 0);
+      CHECK(outcome.says("grid_slam: no map.pgm and map.yaml: the map of "));
+      CHECK(outcome.says("picture of 30000 x 30000; --resolution 0."));
+      std::set<std::string> names = results();
+      names.erase("map.pgm");
+      names.erase("map.yaml");
+      CHECK(names_in(folder / "out") == names);
+      const auto summary = nlohmann::json::parse(cairn::read_file(folder / "out" / "summary.json"));
+      CHECK(summary["notes"].size() == 1);
+      CHECK(summary["map"]["width"] > 30000);
+      CHECK(fs::exists(folder / "map"));
+    }
+    const Outcome coarse = run("--resolution 0.1 " + arguments);
+    CAPTURE(coarse.words);
+    CHECK(coarse.code == 0);
+    CHECK(names_in(folder / "out") == results());
+  }
+
+  TEST_CASE("grid_slam: odometry that leaps to where no map is ends the log, and the scans before are kept") {
+    const cairn_test::Folder folder;
+    const auto named = [&](const std::string& name) { return "\"" + (folder / name).string() + "\""; };
+    const auto log_and_out = [&](const std::string& name) {
+      return "--particles 3 --log " + named(name) + " --out " + named("out_" + name);
+    };
+    folder.put("short", short_log(30));
+    REQUIRE(run(log_and_out("short") + " --save " + named("short.map")).code == 0);
+    for (const double by : {1e6, -9e8})
+      for (const std::string way : {"", " --map stop", " --map ancestry"}) {
+        folder.put("leap", short_log(40, 30, by));
+        const Outcome outcome =
+            run(log_and_out("leap") + (way.empty() ? " --save " + named("leap.map") : way));
+        CAPTURE(by);
+        CAPTURE(outcome.words);
+        CHECK(outcome.code == 3);
+        CHECK(outcome.says("grid_slam: leap: ended after 30 of 40 scans: scan 31 (time 6"));
+        CHECK(names_in(folder / "out_leap") == results());
+        const auto summary = nlohmann::json::parse(cairn::read_file(folder / "out_leap" / "summary.json"));
+        CHECK(summary["scans"] == 30);
+        if (!way.empty()) continue;
+        CHECK(cairn::read_file(folder / "leap.map") == cairn::read_file(folder / "short.map"));
+        for (const char* name : {"map.pgm", "trajectory.txt"})
+          CHECK(cairn::read_file(folder / "out_leap" / name) ==
+                cairn::read_file(folder / "out_short" / name));
+      }
+  }
+
+  TEST_CASE("grid_slam: relations of another log, and scans without a beam, are said") {
+    const cairn_test::Folder folder;
+    folder.put("log", short_log(20));
+    folder.put("other", "1e6 2e6 1 0 0 0 0 0\n");
+    folder.put("some", "0 2 1 0 0 0 0 0\n0 1e6 1 0 0 0 0 0\n");
+    folder.put("blind", "FLASER 1 90 0 0 0 0 0 0 1 h 0\nFLASER 1 90 1 0 0 1 0 0 2 h 0\n");
+    const auto run_with = [&](const std::string& log, const std::string& more) {
+      const Outcome outcome = run("--particles 2 --log \"" + (folder / log).string() + "\" --out \"" +
+                                  (folder / "out").string() + "\"" + more);
+      CAPTURE(outcome.words);
+      CHECK(outcome.code == 0);
+      const auto summary = nlohmann::json::parse(cairn::read_file(folder / "out" / "summary.json"));
+      REQUIRE(summary["notes"].size() == 1);
+      CHECK(outcome.says("grid_slam: " + summary["notes"][0].get<std::string>()));
+      return outcome;
+    };
+    const auto relations = [&](const char* name) {
+      return " --relations \"" + (folder / name).string() + "\"";
+    };
+    CHECK(run_with("log", relations("other")).says("none of the 1 relations has poses"));
+    CHECK(run_with("log", relations("some")).says("1 of 2 relations have no pose"));
+    CHECK(run_with("blind", "").says("no scan has a beam that came back"));
   }
 
   TEST_CASE("grid_slam: interrupted, it writes the scans until then") {

@@ -73,6 +73,12 @@ public:
     return tree_->write(node_, cell);
   }
 
+  /// Whether all tiles from `low` to `high` can be written: what all grids of the tree wrote together would
+  /// not become too wide.
+  [[nodiscard]] bool has_room(TileAddress low, TileAddress high) const {
+    return tree_->cells().has_room(low, high);
+  }
+
   /// Reads many cells many times: each is looked up in the tree once. Lives no longer than the grid, and only
   /// until any grid of the tree is written, copied or destroyed.
   class Reader {

@@ -61,9 +61,18 @@ public:
     return root.blocks[root.place(address)].own()[place_in_block(address)].own();
   }
 
-  /// Throws Error as write() does where the grid could not hold the rectangle of these tiles as well: to be
-  /// asked before the first of many writes.
-  void expect_room(TileAddress low, TileAddress high) const { static_cast<void>(widened(low, high)); }
+  /// Whether all tiles from `low` to `high` can be written: the grid would not become too wide.
+  [[nodiscard]] bool has_room(TileAddress low, TileAddress high) const noexcept {
+    const Root wide = widened(low, high);
+    return wide.columns <= most_blocks && wide.rows <= most_blocks;
+  }
+  /// Throws Error as write() does where there is no room for them: to be asked before the first of many
+  /// writes.
+  void expect_room(TileAddress low, TileAddress high) const {
+    if (!has_room(low, high))
+      raise("SharedTiles: expected cells within a square of 65536 tiles, found tile " +
+            std::to_string(high.column) + ", " + std::to_string(high.row) + " outside of it");
+  }
 
   /// Reads many cells, neighbours soonest: two loads and a comparison are spared within a tile. Lives no
   /// longer than the grid, and only until it is changed.
@@ -134,7 +143,8 @@ public:
   }
 
 private:
-  static constexpr std::int32_t block_side = 16;  // tiles
+  static constexpr std::int32_t block_side = 16;        // tiles
+  static constexpr std::int32_t most_blocks = 1 << 12;  // a side
   static constexpr std::size_t none = ~std::size_t{0};
   using Block = std::array<Counted<Tile>, static_cast<std::size_t>(block_side* block_side)>;
 
@@ -154,8 +164,7 @@ private:
   }
 
   /// The rectangle of blocks, without any, that holds those there are and these tiles.
-  [[nodiscard]] Root widened(TileAddress low, TileAddress high) const {
-    constexpr std::int32_t most = 1 << 12;  // blocks a side
+  [[nodiscard]] Root widened(TileAddress low, TileAddress high) const noexcept {
     std::int32_t left = low.column >> 4, top = low.row >> 4, right = high.column >> 4, bottom = high.row >> 4;
     if (const Root* old = root_.get()) {
       left = std::min(left, old->column);
@@ -163,12 +172,10 @@ private:
       right = std::max(right, old->column + old->columns - 1);
       bottom = std::max(bottom, old->row + old->rows - 1);
     }
-    if (right - left >= most || bottom - top >= most)
-      raise("SharedTiles: expected cells within a square of 65536 tiles, found tile " +
-            std::to_string(high.column) + ", " + std::to_string(high.row) + " outside of it");
     return {left, top, right - left + 1, bottom - top + 1, {}};
   }
   void grow(TileAddress address) {
+    expect_room(address, address);
     Root next = widened(address, address);
     next.blocks.resize(static_cast<std::size_t>(next.columns) * static_cast<std::size_t>(next.rows));
     if (const Root* old = root_.get())
