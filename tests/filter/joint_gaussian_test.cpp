@@ -1116,7 +1116,7 @@ TEST_SUITE("joint_gaussian") {
       [[nodiscard]] Matrix<1> noise(const Vector<1>&) const { return Matrix<1>(variance); }
     };
     for (const double variance : {1e-4, 0.0})  // measured exactly, too
-      for (const int iterations : {2, 3, 5, 30}) {
+      for (const int iterations : {2, 3, 30}) {
         CAPTURE(variance);
         CAPTURE(iterations);
         JointGaussian<Vector<1>> belief;
