@@ -201,13 +201,17 @@ example::PlaneCurve together(const std::string& name, Ink ink,
 
 void add_film(example::Report& page, const Results& r) {
   if (r.snapshots.empty()) return;
-  const cairn::SE2 T = r.T_truth_landmarks.value_or(into_truth(r));  // as the best particle's map lies
+  const cairn::SE2 T = into_truth(r);
   example::PlaneFilm film{
       .title = "Particles and their landmarks over time",
       .caption =
           "The paths of a dozen particles, and the best one's landmarks with ellipses of two standard "
           "deviations. A little while back the paths lie on each other: all particles but one have died out "
-          "there, and the filter has made up its mind.",
+          "there, and the filter has made up its mind." +
+          std::string(r.truth.empty()
+                          ? ""
+                          : " All are moved by the one rigid motion that lays the mean path on the "
+                            "truth; a single particle may lie turned against it."),
       .x = {"x", "m"},
       .y = {"y", "m"},
       .slider = {"time", "s"},
