@@ -356,7 +356,7 @@ TEST_SUITE("keyframe_map") {
   }
 
   TEST_CASE("keyframe_map: landmarks together: none, one that is not there, one named twice") {
-    const Scene s = scene(cairn_test::seed(), 2, 40);
+    const Scene s = scene(cairn_test::seed(), 2, 40, 0.1);
     KeyframeMap map = mapped(s, {});
     const auto none = map.landmarks_in_world({});
     REQUIRE(none);
@@ -477,7 +477,7 @@ TEST_SUITE("keyframe_map") {
   TEST_CASE("keyframe_map: a landmark's covariance in the world holds the errors of its keyframes") {
     const auto seed = cairn_test::seed();
     CAPTURE(seed);
-    const Scene s = scene(seed, 1, 40);
+    const Scene s = scene(seed, 1, 40, 0.1);
     KeyframeMapOptions options = plain();
     options.first_sigma = 0.01;
     KeyframeMap map = mapped(s, options);
@@ -717,7 +717,7 @@ TEST_SUITE("keyframe_map") {
   TEST_CASE("keyframe_map: a landmark whose sightings contradict each other is forgotten") {
     Scene s = scene(cairn_test::seed(), 3, 40, 0.1);  // noise does not decide it
     KeyframeMapOptions options = plain();
-    options.contradiction = 0.999999;
+    options.contradiction = 0.999;
     s.seen[1][7].left(1) += 3.3;  // no gate: it is recorded
     s.seen[1][7].right(1) += 3.3;
     KeyframeMap map = mapped(s, options);
