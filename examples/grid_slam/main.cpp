@@ -27,6 +27,7 @@
 #include "support/command_line.hpp"
 #include "support/interruption.hpp"
 #include "support/progress.hpp"
+#include "support/result_folder.hpp"
 
 namespace {
 
@@ -69,14 +70,6 @@ Input input_of(const Options& options) {
   }
   if (!options.relations.empty()) input.relations = cairn::read_relations(options.relations);
   return input;
-}
-
-/// Says now what would otherwise be heard of after the work.
-void check_save(const std::filesystem::path& file) {
-  if (file.empty()) return;
-  const std::filesystem::path folder = file.has_parent_path() ? file.parent_path() : ".";
-  if (!std::filesystem::is_directory(folder) || std::filesystem::is_directory(file))
-    cairn::raise(file.string() + ": expected the name of a file in a folder that there is");
 }
 
 Mapper mapper_of(const Options& options) {
@@ -203,7 +196,7 @@ int main(int argc, char** argv) {
       cairn::raise("--proposal is for --map stop and --map ancestry");
     if (app.count("--frame") > 0 && (options.map != Maps::tiles || !options.load.empty()))
       cairn::raise("--frame is for a new map of --map tiles");
-    check_save(options.save);
+    example::expect_file_can_be_made(options.save);
     const Input input = input_of(options);
     std::optional<Mapper> mapper;
     Results results =
