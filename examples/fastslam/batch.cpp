@@ -233,6 +233,8 @@ struct PathDensity::Equations {
   BatchOptimum at;
   std::vector<SE2> moved;            // odometry
   std::vector<Vector<3>> residuals;  // of the motions at the optimum
+  /// The optimum's pose k as seen from the one before, inverted, turns a step of that one into a step of k.
+  std::vector<Matrix<3>> carried;
   Eigen::SparseMatrix<double> h;
   Factor root;
   Eigen::VectorXd sigmas;      // D^-1/2
@@ -247,10 +249,6 @@ struct PathDensity::Equations {
       visit(row, cairn::Cholesky<2>(block));
     }
   }
-  /// The optimum's pose k as seen from the one before, inverted, turns a step of that one into a step of k.
-  [[nodiscard]] Matrix<3> carried(std::size_t k) const {
-    return (k == 0 ? at.poses[0].inverse() : SE2(at.poses[k].inverse() * at.poses[k - 1])).adjoint();
-  }
 };
 
 PathDensity::PathDensity(const LandmarkLog& log, BatchOptimum at) {
@@ -260,6 +258,7 @@ PathDensity::PathDensity(const LandmarkLog& log, BatchOptimum at) {
     const SE2 before = k == 0 ? SE2() : equations->at.poses[k - 1];
     equations->moved.push_back(log.frames[k].moved.mean);
     equations->residuals.push_back(cairn::local(before * equations->moved[k], equations->at.poses[k]));
+    equations->carried.push_back((equations->at.poses[k].inverse() * before).adjoint());
   }
   const BatchOptimum& optimum = equations->at;
   equations->h = Problem(log, optimum.landmarks).equations_at({optimum.poses, optimum.landmarks}).matrix();
@@ -289,7 +288,7 @@ std::size_t PathDensity::size() const noexcept {
 // taken as the residual, and the motions are made one after the other.
 std::vector<SE2> PathDensity::path(const std::vector<double>& white) const {
   CAIRN_EXPECTS(white.size() == size(), "path needs as many numbers as size() says");
-  const auto& [at, moved, residuals, h, root, sigmas, log_determinant] = *equations_;
+  const auto& [at, moved, residuals, carried, h, root, sigmas, log_determinant] = *equations_;
   Eigen::VectorXd z = sigmas;
   for (int i = 0; i < z.size(); ++i) z(i) *= white[static_cast<std::size_t>(i)];
   const Eigen::VectorXd d = root.permutationPinv() * Eigen::VectorXd(root.matrixU().solve(z));
@@ -297,7 +296,7 @@ std::vector<SE2> PathDensity::path(const std::vector<double>& white) const {
   Vector<3> before = Vector<3>::Zero();
   for (std::size_t k = 0; k < at.poses.size(); ++k) {
     const Vector<3> step = d.segment<3>(3 * static_cast<int>(k));
-    const Vector<3> residual = residuals[k] + step - equations_->carried(k) * before;
+    const Vector<3> residual = residuals[k] + step - carried[k] * before;
     poses.push_back(cairn::retract((k == 0 ? SE2() : poses.back()) * moved[k], residual));
     before = step;
   }
@@ -312,12 +311,12 @@ std::vector<SE2> PathDensity::draw(cairn::Random& random) const {
 
 // The marginal's information is H_xx - H_xm H_mm^-1 H_mx, and landmarks do not meet each other in H.
 double PathDensity::log_density(const std::vector<SE2>& poses) const {
-  const auto& [at, moved, residuals, h, root, sigmas, log_determinant] = *equations_;
+  const auto& [at, moved, residuals, carried, h, root, sigmas, log_determinant] = *equations_;
   Eigen::VectorXd e = Eigen::VectorXd::Zero(h.rows());
   Vector<3> step = Vector<3>::Zero();
   for (std::size_t k = 0; k < poses.size(); ++k) {
     const Vector<3> residual = cairn::local((k == 0 ? SE2() : poses[k - 1]) * moved[k], poses[k]);
-    step = residual - residuals[k] + equations_->carried(k) * step;
+    step = residual - residuals[k] + carried[k] * step;
     e.segment<3>(3 * static_cast<int>(k)) = step;
   }
   const Eigen::VectorXd v = h.selfadjointView<Eigen::Lower>() * e;
