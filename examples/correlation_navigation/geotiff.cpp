@@ -23,6 +23,8 @@
 
 #include <cairn/io/text.hpp>
 
+#include "degrees.hpp"
+
 namespace correlation_navigation {
 
 namespace {
@@ -32,7 +34,8 @@ using cairn::GridFrame;
 using Byte = unsigned char;
 
 // Tags of GeoTIFF and of GDAL, which libtiff reads without knowing them.
-constexpr std::uint32_t pixel_scale = 33550, transformation = 34264, geo_keys = 34735, no_data = 42113;
+constexpr std::uint32_t pixel_scale = 33550, tie_point = 33922, transformation = 34264, geo_keys = 34735,
+                        no_data = 42113;
 
 /// The first thing that libtiff found wrong with the file that this thread reads.
 thread_local std::string complaint;
@@ -176,29 +179,44 @@ void for_each_sample(const GeoTiff& tiff, const Samples& samples, const Use& use
     }
 }
 
-/// Refuses what the file says not to be in metres (GeoTIFF 1.1, keys GTModelType and ProjLinearUnits).
-void expect_metres(const GeoTiff& tiff) {
-  constexpr int degrees = 2, metres = 9001, by_user = 32767;
+/// Whether the file is in degrees, by GeoTIFF 1.1's keys GTModelType, GeogAngularUnits and ProjLinearUnits;
+/// otherwise it is in metres. Refuses what is neither.
+bool is_in_degrees(const GeoTiff& tiff) {
+  constexpr int model = 1024, angular_unit = 2054, linear_unit = 3076;
+  constexpr int geographic = 2, geocentric = 3, degrees = 9102, metres = 9001, by_user = 32767;
+  bool result = false;
   const auto keys = tiff.numbers<std::uint16_t>(geo_keys, TIFF_SHORT);
   for (std::size_t i = 4; i + 3 < keys.size(); i += 4) {
     if (keys[i + 1] != 0) continue;  // the value stands in another tag
     const int key = keys[i], value = keys[i + 3];
-    if ((key == 1024 && value == degrees) || (key == 3076 && value != metres && value != by_user))
-      tiff.fail("a projected system in metres, found GeoTIFF's key " + std::to_string(key) + " = " +
+    if (key == model && value == geographic) result = true;
+    if ((key == model && value == geocentric) || (key == angular_unit && value != degrees) ||
+        (key == linear_unit && value != metres && value != by_user))
+      tiff.fail("a system in metres or degrees, found GeoTIFF's key " + std::to_string(key) + " = " +
                 std::to_string(value));
   }
+  return result;
 }
 
-GridFrame frame_of(const GeoTiff& tiff, double spacing) {
-  expect_metres(tiff);
+GridFrame frame_of(const GeoTiff& tiff, const Samples& samples, double spacing) {
+  const bool in_degrees = is_in_degrees(tiff);
   GridFrame frame{0, 0, spacing, spacing};
   const auto scale = tiff.numbers<double>(pixel_scale, TIFF_DOUBLE);
   if (scale.size() == 1 || (scale.empty() && !tiff.numbers<double>(transformation, TIFF_DOUBLE).empty()))
     tiff.fail("a pixel scale along x and y, not a transformation");
   if (!scale.empty()) frame = {0, 0, scale[0], scale[1]};
+  if (in_degrees) {
+    const auto tie = tiff.numbers<double>(tie_point, TIFF_DOUBLE);  // column, row, -, longitude, latitude, -
+    if (scale.empty() || tie.size() < 6)
+      tiff.fail("a pixel scale and a tie point where it is in degrees: the latitude makes them metres");
+    const double latitude = tie[4] - (0.5 * samples.rows - tie[1]) * scale[1];
+    constexpr double most_latitude = 89;
+    if (!(std::abs(latitude) <= most_latitude)) tiff.fail("a latitude between -89 and 89 degrees");
+    frame = frame_in_metres(scale[0], scale[1], latitude);
+  }
   constexpr double least = 0.01, most = 1e6;
   if (!(frame.dx >= least && frame.dy >= least && frame.dx <= most && frame.dy <= most))
-    tiff.fail("a spacing of 0.01 to 1e6 metres (a projected system, not degrees)");
+    tiff.fail("a spacing of 0.01 to 1e6 metres, by keys that say where it is in degrees");
   return frame;
 }
 
@@ -219,7 +237,7 @@ std::optional<double> missing_height(const GeoTiff& tiff, const Samples& samples
 FieldGrid read_geotiff(const std::filesystem::path& path, double spacing) {
   const GeoTiff tiff(path);
   const Samples samples = samples_of(tiff);
-  const GridFrame frame = frame_of(tiff, spacing);
+  const GridFrame frame = frame_of(tiff, samples, spacing);
   const std::optional<double> missing = missing_height(tiff, samples);
   FieldGrid grid(samples.columns, samples.rows, frame);
   for_each_sample(tiff, samples, [&](int c, int r, const Byte* place) {

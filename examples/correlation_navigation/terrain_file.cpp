@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <numbers>
 #include <optional>
 #include <string>
 #include <system_error>
@@ -15,6 +14,7 @@
 #include <cairn/io/netpbm.hpp>
 #include <cairn/io/text.hpp>
 
+#include "degrees.hpp"
 #include "geotiff.hpp"
 
 namespace correlation_navigation {
@@ -40,9 +40,8 @@ FieldGrid read_hgt(const std::filesystem::path& path) {
     cairn::raise(path.string() + ": expected 1201 x 1201 or 3601 x 3601 heights of 2 bytes, found " +
                  std::to_string(bytes.size()) + " bytes");
   const double latitude = latitude_of(path.stem().string()).value_or(0.0);
-  constexpr double metres_a_degree = 6371008.8 * std::numbers::pi / 180.0;
-  const double spacing = metres_a_degree / (side - 1);
-  FieldGrid grid(side, side, {0, 0, spacing * std::cos(latitude * std::numbers::pi / 180.0), spacing});
+  const double degrees = 1.0 / (side - 1);
+  FieldGrid grid(side, side, frame_in_metres(degrees, degrees, latitude));
   std::size_t place = 0;
   for (int r = 0; r < side; ++r)
     for (int c = 0; c < side; ++c, place += 2) {  // the high byte first

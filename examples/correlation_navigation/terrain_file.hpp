@@ -14,7 +14,7 @@ namespace correlation_navigation {
 /// The terrain of a file as a grid in metres, x to the east and y to the north, the south-west corner at (0,
 /// 0).
 ///
-///   .tif, .tiff  GeoTIFF, where the program was built with libtiff (geotiff.hpp)
+///   .tif, .tiff  GeoTIFF in metres or degrees, where the program was built with libtiff (geotiff.hpp)
 ///   .hgt         SRTM: 1201 or 3601 squared big-endian 16-bit heights, -32768 void, about 90 or 30 m apart;
 ///                the name (N34W118.hgt) gives the latitude that shortens the east-west spacing
 ///   .pgm         grey values

@@ -314,7 +314,36 @@ TEST_SUITE("terrain_file") {
               .find("a pixel scale") != std::string::npos);
   }
 
-  TEST_CASE("terrain_file: degrees and feet are no metres") {
+  TEST_CASE("terrain_file: degrees are metres by the latitude in the middle") {
+    const Folder folder;
+    const double second = 1.0 / 3600;
+    const auto in_degrees = [&](const std::vector<double>& scale, const std::vector<double>& tie) {
+      folder.put("a.tif", small_tiff()
+                              .tag<std::uint16_t>(34735, 3, {1, 1, 0, 2, 1024, 0, 1, 2, 2054, 0, 1, 9102})
+                              .tag<double>(33550, 12, scale)
+                              .tag<double>(33922, 12, tie)
+                              .file());
+      return read_terrain(folder / "a.tif").frame();
+    };
+    // Along the ellipsoid of WGS 84 (6378137 m, 1 / 298.257) a second of latitude and of longitude are 30.715
+    // and 30.922 m at the equator, 30.870 and 21.902 m at 45 degrees.
+    const cairn::GridFrame equator = in_degrees({second, second, 0}, {0, 0, 0, 10, second, 0});
+    CHECK(equator.dx == doctest::Approx(30.922).epsilon(0.006));
+    CHECK(equator.dy == doctest::Approx(30.715).epsilon(0.006));
+    // A degree a row: the middle of the two is 45 though the north is 46, by whichever corner is tied.
+    const cairn::GridFrame north = in_degrees({second, 1, 0}, {0, 0, 0, 10, 46, 0});
+    CHECK(north.dx == doctest::Approx(21.902).epsilon(0.006));
+    CHECK(in_degrees({second, 1, 0}, {0, 2, 0, 10, 44, 0}).dx == doctest::Approx(north.dx).epsilon(1e-12));
+    CHECK(in_degrees({second, 1, 0}, {0, 0, 0, 10, -44, 0}).dx == doctest::Approx(north.dx).epsilon(1e-12));
+    for (const double latitude : {91.0, -89.0, std::numeric_limits<double>::quiet_NaN()})
+      CHECK(message_of([&] {
+              static_cast<void>(in_degrees({second, 1, 0}, {0, 0, 0, 10, latitude, 0}));
+            }).find("a latitude between") != std::string::npos);
+    CHECK(message_of([&] { static_cast<void>(in_degrees({second, 1, 0}, {0, 0, 0})); }).find("a tie point") !=
+          std::string::npos);
+  }
+
+  TEST_CASE("terrain_file: feet, radians and a geocentric system are refused, and degrees without a place") {
     const Folder folder;
     const auto refusal = [&](std::vector<std::uint16_t> keys) {
       keys.insert(keys.begin(), {1, 1, 0, static_cast<std::uint16_t>(keys.size() / 4)});
@@ -322,7 +351,9 @@ TEST_SUITE("terrain_file") {
       return message_of([&] { static_cast<void>(read_terrain(folder / "a.tif")); });
     };
     CHECK(refusal({1024, 0, 1, 1, 3072, 0, 1, 32611, 3076, 0, 1, 9001}).empty());
-    CHECK(refusal({1024, 0, 1, 2}).find("key 1024 = 2") != std::string::npos);
+    CHECK(refusal({1024, 0, 1, 2}).find("a tie point") != std::string::npos);
+    CHECK(refusal({1024, 0, 1, 3}).find("key 1024 = 3") != std::string::npos);
+    CHECK(refusal({1024, 0, 1, 2, 2054, 0, 1, 9101}).find("key 2054 = 9101") != std::string::npos);
     CHECK(refusal({1024, 0, 1, 1, 3076, 0, 1, 9002}).find("key 3076 = 9002") != std::string::npos);
     CHECK(refusal({3076, 34736, 1, 0}).empty());  // stands elsewhere
     CHECK(refusal({1024}).empty());
