@@ -14,6 +14,7 @@
 #include <cairn/core/statistics.hpp>
 #include <cairn/io/text.hpp>
 
+#include "lost_stretch.hpp"
 #include "stopwatch.hpp"
 #include "surface_patch.hpp"
 
@@ -321,7 +322,7 @@ void Pipeline::lose(const StereoFrame& frame, const std::string& why, FrameRecor
     lost_ = !map_.empty();
   }
   record_.notes.push_back(frame.name + ": lost, " + why + "; the " +
-                          (result.carried ? "motion goes on" : "last pose is kept"));
+                          (result.carried ? "motion goes on" : "last pose is kept until it is found again"));
 }
 
 /// Whether the camera can be there. One that is lost can be anywhere.
@@ -798,8 +799,7 @@ SavedMap Pipeline::map() const {
 
 /// Every frame keeps its place beside the keyframe that was newest then; where that has left, it moves as the
 /// frames nearest in time do whose keyframe is there.
-std::vector<cairn::SE3> Pipeline::corrected_path() const {
-  const std::vector<FrameRecord>& frames = record_.frames;
+std::vector<cairn::SE3> Pipeline::corrected_path(const std::vector<FrameRecord>& frames) const {
   std::vector<std::size_t> known;
   for (std::size_t i = 0; i < frames.size(); ++i)
     if (map_.keyframe_pose(frames[i].reference)) known.push_back(i);
@@ -821,7 +821,8 @@ RunRecord Pipeline::record() {
   RunRecord record = record_;
   record.variance_factor = noise_factors_.poses();
   record.rig = rig_;
-  record.corrected = corrected_path();
+  lay_lost_frames(record.frames, options_.motion.process);
+  record.corrected = corrected_path(record.frames);
   if (const auto rig = map_.rig_correction()) {
     record.calibration.numbers = rig->mean;
     const cairn::RigState before = options_.rig.each();

@@ -136,7 +136,8 @@ public:
   /// Points that an image of the next frames should have, to keep within the budget.
   [[nodiscard]] int wanted_points() const noexcept { return budget_.points(); }
 
-  /// Everything that happened, with the map as it stands now.
+  /// Everything that happened, with the map as it stands now. Frames that were lost between others have the
+  /// poses that these give them (lost_stretch.hpp).
   [[nodiscard]] RunRecord record();
 
   /// The map as it stands now, for another run: without the landmarks that are on probation.
@@ -196,7 +197,7 @@ private:
   void age(const Located& located);
   void merge_twins(const Located& located);
   void forget(LandmarkId id);
-  [[nodiscard]] std::vector<cairn::SE3> corrected_path() const;
+  [[nodiscard]] std::vector<cairn::SE3> corrected_path(const std::vector<FrameRecord>& frames) const;
   void calibrate(const Located& located);
   void look_through(const cairn::StereoRig& rig);
   void find_pairs_by(const cairn::StereoRig& rig);

@@ -36,6 +36,7 @@ struct FrameRecord {
   std::optional<cairn::SE3> truth;  ///< true T_world_camera in the same world, where the data has it
   bool tracked = false;
   bool carried = false;      ///< not tracked, but its motion says where it is
+  bool bridged = false;      ///< neither, but it lies between frames that were: known in hindsight
   bool relocalised = false;  ///< tracked, though nothing was known of where the camera is
   int points_left = 0;
   int points_right = 0;

@@ -67,6 +67,9 @@ void add_figures(example::Report& report, const Summary& summary) {
   if (summary.frames_carried > 0)
     report.figure({"frames carried", std::to_string(summary.frames_carried), "of the lost",
                    "their pose is where the motion leads"});
+  if (summary.frames_bridged > 0)
+    report.figure({"frames bridged", std::to_string(summary.frames_bridged), "of the lost",
+                   "their pose lies between those before and after"});
   if (summary.budget)
     report.figure({"frames that left work out", std::to_string(summary.budget->frames_shed),
                    "of " + std::to_string(summary.frames),

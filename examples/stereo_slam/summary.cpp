@@ -256,6 +256,7 @@ Summary summarise(const RunRecord& run) {
   for (const FrameRecord& frame : run.frames) {
     summary.frames_tracked += frame.tracked ? 1 : 0;
     summary.frames_carried += frame.carried ? 1 : 0;
+    summary.frames_bridged += frame.bridged ? 1 : 0;
     summary.relocalisations += frame.relocalised ? 1 : 0;
   }
   summary.frames_lost = summary.frames - summary.frames_tracked;
@@ -299,6 +300,7 @@ std::string summary_json(const RunRecord& run, const Summary& summary) {
   json["frames_tracked"] = summary.frames_tracked;
   json["frames_lost"] = summary.frames_lost;
   json["frames_carried"] = summary.frames_carried;
+  json["frames_bridged"] = summary.frames_bridged;
   json["poses_refused"] = run.refused;
   json["relocalisations"] = summary.relocalisations;
   json["ended_early"] = run.ended_early ? Json(*run.ended_early) : Json(nullptr);

@@ -103,6 +103,7 @@ struct Summary {
   std::size_t frames_tracked = 0;
   std::size_t frames_lost = 0;
   std::size_t frames_carried = 0;   ///< of these, those whose pose the motion says
+  std::size_t frames_bridged = 0;   ///< of these, those between frames that say it
   std::size_t relocalisations = 0;  ///< how often it found itself in the map again
   double points_left = 0;           ///< median over frames, as the next three
   double stereo_matches = 0;
