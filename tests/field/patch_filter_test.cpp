@@ -171,6 +171,21 @@ TEST_SUITE("patch_filter") {
     std::vector<double> bad = z;
     bad[3] = std::nan("");
     CHECK(verdict(map, bad, {}, prior(1)) == PatchVerdict::not_finite);
+    for (const double size : {1e200, 1e305, 1.7e308})  // finite, and their squares are not
+      for (const bool free : {false, true}) {
+        CAPTURE(size);
+        bad = z;
+        for (std::size_t i = 0; i < bad.size(); i += 3) bad[i] = size;
+        CHECK(verdict(map, bad, {.free_bias = free}, prior(1)) == PatchVerdict::not_finite);
+        FieldGrid steep(140, 80, {0, -40, 1, 1});
+        for (double& value : steep.values()) value = 0.1 * size * random.uniform();
+        const BsplineMap cliffs(std::move(steep));
+        CHECK(verdict(cliffs, z, {.free_bias = free}, prior(1)) == PatchVerdict::not_finite);
+        CHECK(!PatchFilter{}.information(usual_state, where, cliffs, small, noise, scratch));
+      }
+    Gaussian<Vector<5>> vague = prior(1);
+    vague.covariance *= 1e307;  // what the frame says beside it is not finite
+    CHECK(verdict(map, z, {}, vague) == PatchVerdict::not_finite);
     Gaussian<Vector<5>> lost = prior(1);
     lost.mean(2) = INFINITY;
     CHECK(verdict(map, z, {}, lost) == PatchVerdict::not_finite);

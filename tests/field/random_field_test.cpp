@@ -122,5 +122,17 @@ TEST_SUITE("random_field") {
     }
     grid(7, 6) = grid(8, 6) = 0.0;
     CHECK(cairn::gaussian_blur(grid, 0.0).values() == grid.values());
+    double sum = 0;  // as wide as may be: the mean, and no more work than the grid has nodes
+    for (const double value : grid.values()) sum += value / static_cast<double>(grid.values().size());
+    for (const double wide : {1e9, 1e300})
+      CHECK(cairn::gaussian_blur(grid, wide)(3, 4) == doctest::Approx(sum).epsilon(1e-9));
+  }
+
+  TEST_CASE("random_field: a correlation that no memory holds is refused") {
+    cairn::Random random(1);
+    for (const double alpha : {1e-9, 1e-300}) {
+      CAPTURE(alpha);
+      CHECK_THROWS_AS(static_cast<void>(RandomField{1.0, alpha}.draw(5, 5, {}, random)), cairn::Error);
+    }
   }
 }

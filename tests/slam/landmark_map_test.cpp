@@ -314,6 +314,27 @@ TEST_SUITE("slam/landmark_map") {
     CHECK(map.find(4)->log_odds == odds);
   }
 
+  TEST_CASE("landmark_map: a second sighting never makes a landmark less likely to be there") {
+    Map map({}, {.false_share = 1e-6});  // one sighting alone says more than the most that is counted
+    for (int step = 0; step < 3; ++step) {
+      map.insert(Plane::Zero(), {{Plane(1, 0), {}}});
+      CHECK(map.find(0)->log_odds == map.options().most_log_odds);
+    }
+  }
+
+  TEST_CASE("landmark_map: a landmark is not missed by the observation that it begins with") {
+    Relative sure;
+    sure.probability = 0.99;
+    Map map(sure);
+    map.insert(Plane::Zero(), {{Plane(1, 0), {}}, {Plane(0, 1), {}}});
+    REQUIRE(map.size() == 2);
+    CHECK(map.find(0)->log_odds == doctest::Approx(std::log(0.99 / map.options().false_share)));
+    CHECK(map.find(1)->log_odds == map.find(0)->log_odds);
+    map.insert(Plane::Zero(), {{Plane(1, 0), {}}});  // the other one is, from the next on
+    CHECK(map.find(0) != nullptr);
+    CHECK(map.find(1) == nullptr);
+  }
+
   TEST_CASE("landmark_map: a named landmark outside its gate is clutter, and none is seen twice at once") {
     Random random(1);
     Map map({}, {.gate_of_named = 0.99});
@@ -394,6 +415,14 @@ TEST_SUITE("slam/landmark_map") {
               .find(not_finite + "1") != std::string::npos);
     CHECK(bad({{RangeBearing::measurement(1, 0), LandmarkMap<Polar>::most_identity}})
               .find("expected identities below 16777216, found 16777216") != std::string::npos);
+    for (const std::uint32_t number : {LandmarkMap<Polar>::most_identity, no_landmark, new_landmark}) {
+      const LandmarkMap<Polar>::Observation two{{RangeBearing::measurement(1, 0), 1},
+                                                {RangeBearing::measurement(2, 0), number}};
+      CHECK(words_of([&] {
+              map.insert(SE2(), two, {new_landmark, new_landmark});
+            }).find("expected identities below 16777216") != std::string::npos);
+      CHECK(map.size() == 0);
+    }
     CHECK_THROWS_AS((LandmarkMap<Polar>({}, {.gate = 1})), Error);
     CHECK_THROWS_AS((LandmarkMap<Polar>({}, {.new_density = 0})), Error);
     CHECK_THROWS_AS((LandmarkMap<Polar>({}, {.remove_below = nan})), Error);

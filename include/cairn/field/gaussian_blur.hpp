@@ -18,10 +18,10 @@ namespace cairn { inline namespace CAIRN_ABI {
 
 namespace detail {
 
-/// exp(-x^2 / (2 sigma^2)) at 0, 1, 2, ... as far as it is above 1e-12; sigma in nodes.
-inline std::vector<double> half_gaussian(double sigma) {
+/// exp(-x^2 / (2 sigma^2)) at 0, 1, 2, ... `most`, as far as it is above 1e-12; sigma in nodes.
+inline std::vector<double> half_gaussian(double sigma, int most) {
   std::vector<double> weights{1.0};
-  for (int i = 1; sigma > 0.0; ++i) {
+  for (int i = 1; sigma > 0.0 && i <= most; ++i) {
     const double weight = std::exp(-0.5 * (i / sigma) * (i / sigma));
     if (weight < 1e-12) break;
     weights.push_back(weight);
@@ -62,8 +62,8 @@ inline void blur_grid(FieldGrid& grid, const std::vector<double>& along_x,
   for (std::size_t i = 0; i < grid.values().size(); ++i)
     if (std::isnan(grid.values()[i])) weight.values()[i] = grid.values()[i] = 0.0;
   const std::vector<double> known = weight.values();
-  const std::vector<double> along_x = detail::half_gaussian(sigma / grid.frame().dx);
-  const std::vector<double> along_y = detail::half_gaussian(sigma / grid.frame().dy);
+  const std::vector<double> along_x = detail::half_gaussian(sigma / grid.frame().dx, grid.columns() - 1);
+  const std::vector<double> along_y = detail::half_gaussian(sigma / grid.frame().dy, grid.rows() - 1);
   detail::blur_grid(grid, along_x, along_y);
   detail::blur_grid(weight, along_x, along_y);
   for (std::size_t i = 0; i < grid.values().size(); ++i)

@@ -118,8 +118,12 @@ PatchUpdate PatchFilter::update(Gaussian<typename Placement::State>& belief, con
     result.verdict = PatchVerdict::gated;
   if (!result.accepted()) return result;
   const Matrix<n> M = Matrix<n>::Identity() + A;
-  belief.mean += product(L, u);
-  belief.covariance = symmetrised(product(L, Cholesky<n>(M).solve(transposed(L))));  // (2)
+  const Gaussian<typename Placement::State> posterior{
+      belief.mean + product(L, u), symmetrised(product(L, Cholesky<n>(M).solve(transposed(L))))};  // (2)
+  if (all_finite(posterior.mean) && all_finite(posterior.covariance))
+    belief = posterior;
+  else
+    result.verdict = PatchVerdict::not_finite;
   return result;
 }
 

@@ -53,9 +53,9 @@ struct PatchLinearisation {
   bool free_gain = false;       ///< eliminate an unknown gain (and the bias with it)
   double smallest_share = 0.5;  ///< of the samples that must lie inside the map
 
-  /// The frame's Gram matrix at a placement, or why there is none: outside, flat or of another size than the
-  /// shape. z may be empty when only the information is wanted (the gradient is then that of a perfect frame:
-  /// zero). O(samples).
+  /// The frame's Gram matrix at a placement, or why there is none: outside, flat, of another size than the
+  /// shape, or of numbers so large that their squares overflow (not_finite). z may be empty when only the
+  /// information is wanted (the gradient is then that of a perfect frame: zero). O(samples).
   template <FieldInterpolant Map>
   PatchVerdict gram(const Map& map, const PatchShape& shape, const PatchPlacement& at,
                     std::span<const double> z, const PatchNoise& noise, PatchScratch& scratch,
@@ -72,7 +72,10 @@ struct PatchLinearisation {
     if (free_gain && !has_contrast(f, mean)) return PatchVerdict::flat;
     fill_columns(shape, f, mean, z, scratch.columns);
     Matrix<9> all = noise.weigh<9>(scratch.columns, f.count_inside == shape.size());
-    return eliminate_sensor(all, result) ? PatchVerdict::accepted : PatchVerdict::flat;
+    if (!all_finite(all)) return PatchVerdict::not_finite;
+    if (!eliminate_sensor(all, result)) return PatchVerdict::flat;
+    return all_finite(result.information) && all_finite(result.gradient) ? PatchVerdict::accepted
+                                                                         : PatchVerdict::not_finite;
   }
 
 private:

@@ -15,6 +15,7 @@
 /// presentation of navigation information".)
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <numbers>
@@ -46,7 +47,8 @@ struct RandomField {
   [[nodiscard]] double slope_variance() const noexcept { return 2.0 * alpha * alpha * sigma * sigma; }  // (3)
 
   /// A draw on a grid. Stationary up to the rim; the same random state gives the same field. Spacings should
-  /// be a fraction of 1 / alpha. O(nodes / (alpha * spacing)).
+  /// be a fraction of 1 / alpha. Throws Error where they are less than a 200,000th of it. O(n / (alpha *
+  /// spacing)) for n nodes, those that lie within 4 / alpha around the grid among them.
   [[nodiscard]] FieldGrid draw(int columns, int rows, const GridFrame& frame, Random& random) const;
 };
 
@@ -54,8 +56,11 @@ inline FieldGrid RandomField::draw(int columns, int rows, const GridFrame& frame
   CAIRN_EXPECTS(sigma >= 0.0 && alpha > 0.0 && std::isfinite(sigma + alpha),
                 "a random field needs sigma >= 0 and alpha > 0");
   const double blur = 0.5 / alpha;  // exp(-2 alpha^2 d^2) as a Gaussian
-  const std::vector<double> along_x = detail::half_gaussian(blur / frame.dx);
-  const std::vector<double> along_y = detail::half_gaussian(blur / frame.dy);
+  constexpr int most = 1 << 20;     // weights: out of reach within the bound on the spacings
+  if (!(blur <= 1e5 * std::min(frame.dx, frame.dy)))
+    raise("RandomField: expected spacings of at least a 200,000th of 1 / alpha");
+  const std::vector<double> along_x = detail::half_gaussian(blur / frame.dx, most);
+  const std::vector<double> along_y = detail::half_gaussian(blur / frame.dy, most);
   const int rim_x = static_cast<int>(along_x.size()) - 1, rim_y = static_cast<int>(along_y.size()) - 1;
   FieldGrid noise(columns + 2 * rim_x, rows + 2 * rim_y, frame);
   for (double& value : noise.values()) value = random.normal();

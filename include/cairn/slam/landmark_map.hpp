@@ -288,7 +288,9 @@ public:
     return sighting.identity ? common_->gate_of_named : common_->gate;
   }
 
-  /// Takes the sightings in: updates, new landmarks, and the odds of what was not seen though in view.
+  /// Takes the sightings in: updates, new landmarks, and the odds of what was not seen though in view. Throws
+  /// Error, and has changed nothing, where an identity is too large; what is not finite is passed over. An
+  /// observation without sightings changes nothing: it may be that nobody looked.
   void insert(const Pose& x, const Observation& z, const Choice& n);
   /// The same with the likeliest association at this pose.
   void insert(const Pose& x, const Observation& z) {
@@ -327,6 +329,11 @@ private:
   static Gaussian<Pose> known(const Pose& x) { return {x, CovarianceOf<Pose>::Zero(dof_of(x), dof_of(x))}; }
 
   void check(const Observation& z) const;
+  static void check_identity(const Sighting& sighting) {
+    if (sighting.identity && *sighting.identity >= most_identity)
+      raise("LandmarkMap: expected identities below " + std::to_string(most_identity) + ", found " +
+            std::to_string(*sighting.identity));
+  }
   [[nodiscard]] bool begins(const Measurement& z) const {
     if constexpr (requires(const L& l) { l.determines(z); })
       return common_->sensor.determines(z);
@@ -343,7 +350,7 @@ private:
 
   [[nodiscard]] std::optional<Gaussian<Landmark>> seen_first(const Pose& x, const Measurement& z) const;
   void update(const Pose& x, const Measurement& z, std::uint32_t number);
-  void add(const Pose& x, const Sighting& sighting);
+  std::optional<std::uint32_t> add(const Pose& x, const Sighting& sighting);
   void remove(std::uint32_t number);
   void miss(const Pose& x, const Choice& seen);
   [[nodiscard]] std::vector<std::uint32_t> in_view(const Pose& x) const;
@@ -548,9 +555,7 @@ void LandmarkMap<L, F>::check(const Observation& z) const {
   for (std::size_t k = 0; k < z.size(); ++k) {
     if (!detail::finite_state(detail::measured<L>(detail::model_of(common_->sensor, z[k].z), z[k].z)))
       raise("LandmarkMap: expected sightings of finite numbers, found another: " + std::to_string(k));
-    if (z[k].identity && *z[k].identity >= most_identity)
-      raise("LandmarkMap: expected identities below " + std::to_string(most_identity) + ", found " +
-            std::to_string(*z[k].identity));
+    check_identity(z[k]);
   }
 }
 
@@ -744,15 +749,19 @@ double LandmarkMap<L, F>::log_likelihood(const Pose& x, const Observation& z, co
 template <LandmarkSensor L, class F>
 void LandmarkMap<L, F>::insert(const Pose& x, const Observation& z, const Choice& n) {
   CAIRN_EXPECTS(n.size() == z.size(), "insert needs one landmark for each sighting");
+  for (const Sighting& sighting : z) check_identity(sighting);
   bool unnamed = false;
+  Association seen;  // by the numbers that landmarks have now, which the new ones had not before
   for (std::size_t k = 0; k < z.size(); ++k) {
     unnamed = unnamed || !z[k].identity;
-    if (n[k] == new_landmark)
-      add(x, z[k]);
-    else if (find(n[k]) != nullptr)
+    if (n[k] == new_landmark) {
+      if (const auto number = add(x, z[k])) seen.push_back(*number);
+    } else if (find(n[k]) != nullptr) {
       update(x, z[k].z, n[k]);
+      seen.push_back(n[k]);
+    }
   }
-  if (unnamed) miss(x, n);
+  if (unnamed) miss(x, seen);
 }
 
 template <LandmarkSensor L, class F>
@@ -788,15 +797,18 @@ std::optional<Gaussian<typename LandmarkMap<L, F>::Landmark>> LandmarkMap<L, F>:
   return landmark;
 }
 
+/// The number of the landmark that begins with this sighting; nothing where none does.
 template <LandmarkSensor L, class F>
-void LandmarkMap<L, F>::add(const Pose& x, const Sighting& sighting) {
+std::optional<std::uint32_t> LandmarkMap<L, F>::add(const Pose& x, const Sighting& sighting) {
   const auto landmark = seen_first(x, sighting.z);
-  if (!landmark) return;
+  if (!landmark) return std::nullopt;
   const auto number = sighting.identity.value_or(static_cast<std::uint32_t>(landmarks_.size()));
-  if (find(number) != nullptr) return;  // named twice in one observation
-  landmarks_.write(number) = {*landmark, gained_odds(x, landmark->mean), 1};
+  if (find(number) != nullptr) return std::nullopt;  // named twice in one observation
+  landmarks_.write(number) = {*landmark, std::min(gained_odds(x, landmark->mean), options().most_log_odds),
+                              1};
   ++size_;
   file(number, true);
+  return number;
 }
 
 template <LandmarkSensor L, class F>
