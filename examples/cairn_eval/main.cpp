@@ -46,9 +46,11 @@ std::set<std::string> keys(const std::map<std::string, Value>& map) {
 }
 
 void add_options(CLI::App& app, Options& o) {
+  app.option_defaults()->always_capture_default();
   app.add_option("truth", o.truth, "the true trajectory: TUM, KITTI or EuRoC")->required();
   app.add_option("estimates", o.estimates, "estimates of it, one file or more")->required();
-  app.add_option("--names", o.names, "of the estimates, for tables and pictures; else those of their files");
+  app.add_option("--names", o.names, "of the estimates, for tables and pictures; else those of their files")
+      ->default_str("");
   app.add_option(
          "--align", o.align,
          "none: the worlds are the same; first: first poses coincide; rigid: least squares; similarity: "
@@ -59,7 +61,8 @@ void add_options(CLI::App& app, Options& o) {
   app.add_option("--truth-format", o.truth_format, "of the truth")->check(CLI::IsMember(keys(formats)));
   app.add_option("--times", o.times, "times.txt of KITTI files, which have no times of their own");
   app.add_option("--covariances", o.covariances,
-                 "trajectory_covariance.csv of each estimate, for NEES; - for one that has none");
+                 "trajectory_covariance.csv of each estimate, for NEES; - for one that has none")
+      ->default_str("");
   app.add_option("--max-difference", o.evaluation.association.largest_difference,
                  "between the times of an estimated and a true pose [s]")
       ->check(example::number_between(0, 1e6));

@@ -131,7 +131,7 @@ int main(int argc, char** argv) {
       ->type_name("GLOB")
       ->required();
   app.add_option("--corners", arguments.corners, "inner corners of the board: in a row, and rows")
-      ->check(example::whole_number(2, 100))
+      ->check(example::whole_number(3, 100))  // fewer OpenCV does not look for
       ->type_name("COLUMNS ROWS")
       ->capture_default_str();
   app.add_option("--square", arguments.square, "side of a square [m]; the length of the baseline follows it")

@@ -184,11 +184,14 @@ int main(int argc, char** argv) {
   const std::string name = "correlation_navigation";
   Options options;
   CLI::App app{"Correlation navigation over a mapped field: search, track, map and correct."};
-  app.add_option(
+  app.option_defaults()->always_capture_default();
+  auto* const terrain = app.add_option(
       "--terrain", options.terrain,
       "elevation model for acquisition, turns and loop: GeoTIFF, .hgt or .pgm; a synthetic field by default");
-  app.add_option("--spacing", options.spacing, "metres between the pixels of a .pgm")
-      ->check(example::number_between(0.01, 1e6));
+  app.add_option("--spacing", options.spacing,
+                 "metres between the pixels of a .pgm, or of a GeoTIFF that does not say")
+      ->check(example::number_between(0.01, 1e6))
+      ->needs(terrain);
   app.add_option("--out", options.out, "folder for summary.json, errors.csv and report.html");
   app.add_option("--runs", options.runs, "Monte Carlo runs of the straight flight")
       ->check(example::whole_number(1, 100000));

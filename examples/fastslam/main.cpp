@@ -89,6 +89,7 @@ void print(const Results& r, const std::filesystem::path& out) {
 }
 
 void add_options(CLI::App& app, Options& o) {
+  app.option_defaults()->always_capture_default();
   app.add_option("--data", o.data,
                  "loop (simulated), map (simulated over a published map), mrclam, victoria_park")
       ->check(CLI::IsMember({"loop", "map", "mrclam", "victoria_park"}));
@@ -116,6 +117,18 @@ void add_options(CLI::App& app, Options& o) {
   app.add_option("--threads", o.slam.threads, "threads")->check(example::whole_number(1, 1024));
 }
 
+/// Throws where an option was given that would do nothing.
+void expect_use_of_all(const CLI::App& app, const Options& o) {
+  using example::expect_absent;
+  if (o.data != "map") expect_absent(app, {"--name"}, "for --data map");
+  if (o.data == "loop") expect_absent(app, {"--folder"}, "for data that is read: map, mrclam, victoria_park");
+  if (o.data != "mrclam") expect_absent(app, {"--robot"}, "for --data mrclam");
+  if (o.data != "loop" && o.data != "map")
+    expect_absent(app, {"--frames"}, "for simulated drives: --data loop and map");
+  if (o.identities == "known") expect_absent(app, {"--association"}, "for --identities withheld");
+  if (o.proposal == "motion") expect_absent(app, {"--redraw"}, "for --proposal landmarks");
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -126,6 +139,7 @@ int main(int argc, char** argv) {
   add_options(app, options);
   if (const std::optional<int> code = example::parse(app, name, argc, argv)) return *code;
   return example::exit_code_of(name, [&]() -> int {
+    expect_use_of_all(app, options);
     LandmarkLog log = log_of(options);
     if (options.identities == "withheld") log.withhold_identities();
     options.slam.proposal = options.proposal == "motion" ? ProposalKind::motion : ProposalKind::landmarks;

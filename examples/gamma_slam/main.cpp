@@ -71,24 +71,31 @@ int main(int argc, char** argv) {
   RecordedDriveOptions recorded;
 #endif
   CLI::App app{"Maps rough ground by the spread of its heights: particles over a rendered terrain."};
+  app.option_defaults()->always_capture_default();
   app.add_option("--cells", options.cells,
                  "what a cell keeps: heights (mean and spread) or variance (spread)")
       ->transform(example::one_of<Cells>({{"heights", Cells::heights}, {"variance", Cells::variance}}))
-      ->type_name("NAME");
+      ->type_name("NAME")
+      ->default_str("heights");
   app.add_option("--cell-size", options.map.geometry.cell_size, "[m]")
       ->check(example::number_between(0.05, 2));
+  auto* const laps_option =
+      app.add_option("--laps", laps, "of 80 m, of the rendered drive")->check(example::whole_number(1, 20));
 #ifdef GAMMA_SLAM_HAS_RECORDINGS
   auto* const folder = app.add_option(
       "--drive", recorded.folder,
       "a folder of recorded stereo images and their true poses (poses_cam0_rectified.txt "
       "of kitti_raw, poses.txt of kitti_odometry, state_groundtruth_estimate0/ of euroc), driven "
       "forwards and backwards");
+  folder->excludes(laps_option);
   app.add_option("--kind", recorded.kind, "of the folder: kitti_raw, kitti_odometry or euroc")
       ->check(CLI::IsMember({"kitti_raw", "kitti_odometry", "euroc"}))
       ->needs(folder);
-  app.add_option("--frames", recorded.frames, "only so many")->check(example::whole_number(2))->needs(folder);
+  app.add_option("--frames", recorded.frames, "only so many")
+      ->check(example::whole_number(2))
+      ->default_str("all")
+      ->needs(folder);
 #endif
-  app.add_option("--laps", laps, "of 80 m, of the rendered drive")->check(example::whole_number(1, 20));
   app.add_option("--out", out, "folder for the maps, the trajectory, the summary and the report");
   app.add_option("--particles", options.particles, "number of particles")
       ->check(example::whole_number(1, 10000));
@@ -108,9 +115,13 @@ int main(int argc, char** argv) {
     Drive drive;
 #ifdef GAMMA_SLAM_HAS_RECORDINGS
     if (recording) {
-      example::Progress progress(std::clog, "frames", frame_count(*recording));
+      example::Progress frames(std::clog, "frames", frame_count(*recording));
+      std::optional<example::Progress> steps;  // from the first on, for its clock
       try {
-        drive = recorded_drive(*recording, recorded, watched(progress, "frames"));
+        drive = recorded_drive(*recording, recorded, watched(frames, "frames"), [&] {
+          if (!steps) steps.emplace(std::clog, "odometry", frame_count(*recording) - 1);
+          return watched(*steps, "steps of odometry")();
+        });
       } catch (const Interrupted& why) {
         std::cerr << name << ": " << why.what() << ", before the first scan: nothing is written\n";
         return example::exit_interrupted;

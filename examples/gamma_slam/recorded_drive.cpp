@@ -216,7 +216,8 @@ std::size_t frame_count(const stereo_slam::Dataset& data) {
 }
 
 Drive recorded_drive(const stereo_slam::Dataset& data, const RecordedDriveOptions& options,
-                     const std::function<std::optional<std::string>()>& on_frame) {
+                     const std::function<std::optional<std::string>()>& on_frame,
+                     const std::function<std::optional<std::string>()>& on_step) {
   Frames found = frames_of(data, options, on_frame);
   const std::vector<Frame>& frames = found.all;
   Drive drive;
@@ -242,6 +243,8 @@ Drive recorded_drive(const stereo_slam::Dataset& data, const RecordedDriveOption
     TerrainScan scan = steps.back();
     perturb(scan, options.noise, random);
     add(i, std::move(scan), frames[i].time, false);
+    if (on_step)
+      if (const auto interrupted = on_step()) throw Interrupted(*interrupted);
   }
   if (found.why_no_more)
     drive.ended_early = "ended after " + std::to_string(frames.size()) + " of " +

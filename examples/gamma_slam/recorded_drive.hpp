@@ -61,8 +61,10 @@ public:
 
 /// The drive ends, and turns back, before the first frame that cannot be read, shows no ground, has no true
 /// pose or where odometry fails; throws cairn::Error where that leaves less than two. `on_frame` is called
-/// after every frame, by one thread at a time; what it returns, if anything, is thrown as Interrupted.
+/// after every frame, by one thread at a time, and then `on_step` after every step of odometry; what either
+/// returns, if anything, is thrown as Interrupted.
 [[nodiscard]] Drive recorded_drive(const stereo_slam::Dataset& data, const RecordedDriveOptions& options,
-                                   const std::function<std::optional<std::string>()>& on_frame = {});
+                                   const std::function<std::optional<std::string>()>& on_frame = {},
+                                   const std::function<std::optional<std::string>()>& on_step = {});
 
 }  // namespace gamma_slam

@@ -115,7 +115,7 @@ Results map_stops(const Options& options, const Input& input) {
 
 Results map_occupancy(const Options& options, const Input& input, std::optional<Mapper>& mapper) {
   mapper.emplace(mapper_of(options));
-  prepare_folder(options.out);
+  prepare_folder(options.out, {options.save});
   const example::Interruption interruption;
   example::Progress progress(std::clog, "scans", input.log.scans.size());
   constexpr std::size_t frames = 48;  // of the report's film
@@ -148,6 +148,7 @@ int main(int argc, char** argv) {
   const std::string name = "grid_slam";
   Options options;
   CLI::App app{"Maps a floor from laser scans and odometry: a particle filter over occupancy grids."};
+  app.option_defaults()->always_capture_default();
   auto* log = app.add_option("--log", options.log,
                              "a CARMEN log (FLASER, ROBOTLASER1 or RAWLASER1 lines) or one of DP-SLAM");
   app.add_flag("--simulate", options.simulate, "a rendered drive around a corridor, also without --log")
@@ -156,16 +157,19 @@ int main(int argc, char** argv) {
                  "tiles: occupancy, scans matched; stop, ancestry: DP-SLAM on shared tiles or on its tree")
       ->transform(
           example::one_of<Maps>({{"tiles", Maps::tiles}, {"stop", Maps::stop}, {"ancestry", Maps::ancestry}}))
-      ->type_name("NAME");
+      ->type_name("NAME")
+      ->default_str("tiles");
   app.add_option("--frame", options.frame,
                  "of the map: odometry's, or start, the laser's first pose, wherever odometry begins")
       ->transform(example::one_of<Frame>({{"odometry", Frame::odometry}, {"start", Frame::start}}))
-      ->type_name("NAME");
+      ->type_name("NAME")
+      ->default_str("odometry");
   app.add_option("--proposal", options.proposal,
                  "of --map stop and ancestry: poses drawn from odometry (motion), or where the scan matches")
       ->transform(
           example::one_of<StopProposal>({{"motion", StopProposal::motion}, {"match", StopProposal::match}}))
-      ->type_name("NAME");
+      ->type_name("NAME")
+      ->default_str("motion");
   app.add_option("--relations", options.relations,
                  "relations to measure the path by: t1 t2 x y z roll pitch yaw");
   app.add_option("--out", options.out, "folder for the map, the trajectory, the summary and the report");
@@ -183,9 +187,13 @@ int main(int argc, char** argv) {
       ->excludes(localise);
   app.add_option("--resolution", options.resolution, "side of a cell [m]: 0.05, or what a loaded map has")
       ->check(example::number_between(0.01, 1));
-  app.add_option("--particles", options.particles, "number of particles")
+  app.add_option("--particles", options.particles,
+                 "number of particles: 30 (50 of --map stop and ancestry drawn from motion), or what a "
+                 "loaded map has")
       ->check(example::whole_number(1, 10000));
-  app.add_option("--seed", options.seed, "the same seed gives the same results for any number of threads")
+  app.add_option(
+         "--seed", options.seed,
+         "the same seed gives the same results for any number of threads: 1, or what a loaded map has")
       ->check(example::whole_number(0));
   app.add_option("--threads", options.threads, "threads")->check(example::whole_number(1, 1024));
   if (const std::optional<int> code = example::parse(app, name, argc, argv)) return *code;
@@ -196,7 +204,9 @@ int main(int argc, char** argv) {
       cairn::raise("--proposal is for --map stop and --map ancestry");
     if (app.count("--frame") > 0 && (options.map != Maps::tiles || !options.load.empty()))
       cairn::raise("--frame is for a new map of --map tiles");
-    example::expect_file_can_be_made(options.save);
+    for (const std::string* read : {&options.log, &options.relations})
+      if (example::same_file(options.save, *read))
+        cairn::raise(*read + ": is read by this run; expected another name for --save");
     const Input input = input_of(options);
     std::optional<Mapper> mapper;
     Results results =

@@ -71,8 +71,10 @@ void measure(Results& results, const std::vector<cairn::PoseRelation>& relations
 [[nodiscard]] std::string summary(const Results& results);
 [[nodiscard]] std::optional<std::string> report(const Results& results);
 
-/// Makes the folder where it is missing and checks that a file can be written. Throws cairn::Error.
-void prepare_folder(const std::filesystem::path& folder);
+/// Makes the folder where it is missing and checks that a file can be written, and `besides`, if they have
+/// names, beside the results. Throws cairn::Error.
+void prepare_folder(const std::filesystem::path& folder,
+                    const std::vector<std::filesystem::path>& besides = {});
 
 /// Writes all files or, throwing cairn::Error, none. Returns why there is no report, where there is none.
 [[nodiscard]] std::optional<std::string> write_outputs(const Results& results,

@@ -32,12 +32,14 @@ void measure(Results& r, const std::vector<cairn::PoseRelation>& relations) {
 
 void end_of_data(Results& r, const cairn::CarmenLog& log, std::size_t next, const std::string& why) {
   r.data_ended = true;
-  std::string where = "scan " + std::to_string(next + 1) + " (time " + cairn::shortest(log.scans[next].time);
+  const cairn::StampedScan& scan = log.scans[next];
+  std::string where = "scan " + std::to_string(next + 1) + " (";
+  if (scan.line > 0) where += "line " + std::to_string(scan.line) + ", ";
+  where += "time " + cairn::shortest(scan.time);
   if (next > 0)
     where += ", by odometry " +
              cairn::shortest(std::round(
-                 (log.scans[next].T_odom_laser.translation() - log.scans[next - 1].T_odom_laser.translation())
-                     .norm())) +
+                 (scan.T_odom_laser.translation() - log.scans[next - 1].T_odom_laser.translation()).norm())) +
              " m from the one before";
   r.ended_early = "ended after " + std::to_string(next) + " of " + std::to_string(log.scans.size()) +
                   " scans: " + where + "): " + why;

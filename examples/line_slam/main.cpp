@@ -64,6 +64,7 @@ int main(int argc, char** argv) {
   bool quiet = false;
   CLI::App app{
       "Maps straight edges that three cameras see: particles over a drive around a rendered campus."};
+  app.option_defaults()->always_capture_default();
   std::string detector = "noise";
   app.add_option("--detector", detector,
                  "noise: the edges in view, with errors; lsd: what OpenCV's detector finds in the pictures")

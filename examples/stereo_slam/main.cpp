@@ -163,6 +163,23 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
       ->type_name("DIR");
 }
 
+/// Throws where an option was given that would do nothing.
+void expect_use_of_all(const CLI::App& app, const Arguments& arguments) {
+  const bool arena = arguments.dataset.kind == "arena";
+  if (arena && !arguments.dataset.folder.empty())
+    cairn::raise("--dataset arena is rendered; expected no folder, found " +
+                 arguments.dataset.folder.string());
+  if (!arena) example::expect_absent(app, {"--script", "--drift", "--no-cache"}, "for --dataset arena");
+  if (arguments.features != "surf") example::expect_absent(app, {"--oriented"}, "for --features surf");
+  if (!arguments.dump.empty())
+    example::expect_absent(app,
+                           {"--out", "--store", "--points", "--budget", "--oriented", "--calibrate",
+                            "--motion", "--features", "--live", "--save", "--save-rig", "--load"},
+                           "for a run, and --dump makes none");
+  if (example::same_file(arguments.save_map, arguments.camera))
+    cairn::raise(arguments.save_map.string() + ": is what --camera reads; expected another name for --save");
+}
+
 /// What a run left, and with which exit code the program is to say so.
 struct Run {
   stereo_slam::RunRecord record;
@@ -291,6 +308,7 @@ int main(int argc, char** argv) {
   try {
     arguments.dataset.kind = arguments.dataset.left.empty() ? dataset.front() : "images";
     if (dataset.size() > 1) arguments.dataset.folder = dataset[1];
+    expect_use_of_all(app, arguments);
     arguments.pipeline.threads = stereo_slam::threads_behind(arguments.threads);
     arguments.dataset.threads = arguments.threads;
     if (arguments.dump.empty()) arguments.dataset.threads /= stereo_slam::threads_ahead(arguments.threads);
@@ -317,13 +335,7 @@ int main(int argc, char** argv) {
       rig.rotation = std::max(rig.rotation, given->angle_sigma().value_or(0));
       rig.direction = std::max(rig.direction, given->angle_sigma().value_or(0));
     }
-    stereo_slam::prepare_output_folder(arguments.out);
-    example::expect_file_can_be_made(arguments.save_map);
-    example::expect_file_can_be_made(arguments.save_rig);
-    if (!arguments.save_map.empty() &&
-        arguments.save_map.lexically_normal() == arguments.save_rig.lexically_normal())
-      cairn::raise(arguments.save_map.string() +
-                   ": expected two names, one for --save and one for --save-rig");
+    stereo_slam::prepare_output_folder(arguments.out, {arguments.save_map, arguments.save_rig});
     arguments.pipeline.sample_frame = frames->size() / 2;
     std::optional<example::LivePage> live;
     if (arguments.live) {

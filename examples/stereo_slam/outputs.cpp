@@ -48,8 +48,8 @@ double largest_sigma(const cairn::Matrix<3, 3>& covariance) {
 
 }  // namespace
 
-void prepare_output_folder(const fs::path& folder) {
-  results_in(folder).prepare();
+void prepare_output_folder(const fs::path& folder, const std::vector<std::filesystem::path>& besides) {
+  results_in(folder).prepare(besides);
 }
 
 example::CalibratedRig learned_rig(const example::CalibratedRig& given, const RunRecord& run) {

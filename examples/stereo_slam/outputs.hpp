@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "run_record.hpp"
 #include "support/rig_file.hpp"
@@ -17,8 +18,10 @@
 namespace stereo_slam {
 
 /// Makes the folder where it is missing, removes what killed runs left and proves that files can be written
-/// there, so that a run does not end in vain. Throws cairn::Error naming it.
-void prepare_output_folder(const std::filesystem::path& folder);
+/// there, so that a run does not end in vain; `besides` are other files that the run is to write, or empty.
+/// Throws cairn::Error naming what cannot be.
+void prepare_output_folder(const std::filesystem::path& folder,
+                           const std::vector<std::filesystem::path>& besides = {});
 
 /// Writes all files or, throwing cairn::Error that names the path, none: they take the place of another run's
 /// as one step (support/result_folder.hpp). Returns why there is no report, where this program was built

@@ -15,6 +15,7 @@
 #include <cairn/io/text.hpp>
 
 #include "lost_stretch.hpp"
+#include "mistaken_sides.hpp"
 #include "stopwatch.hpp"
 #include "surface_patch.hpp"
 
@@ -102,6 +103,10 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options, 
                  feature_names[static_cast<std::size_t>(options.features)]);
   if (options.calibrate == Calibration::drifting && known.map.rig_correction())
     cairn::raise(name + ": this map estimates its rig, which cannot be followed as drifting besides");
+  if (options.calibrate == Calibration::on && !known.map.rig_correction())
+    cairn::raise(name + ": this map does not estimate its rig, which has to begin with the map");
+  if (options.calibrate == Calibration::off && known.map.rig_correction())
+    cairn::raise(name + ": this map estimates its rig, which cannot be left as it was given");
   map_ = std::move(known.map);
   noise_factors_ = NoiseFactors(map_.pixel_factor(), map_.pose_factor());
   step_ = known.steps;
@@ -181,7 +186,13 @@ void Pipeline::work_on(const StereoFrame& frame, const FramePoints& points, Fram
   image_ = frame.left;
   timed(result, Stage::total, [&] {
     timed(result, Stage::stereo, [&] {
-      find_local_landmarks(points.matched_by == match_stereo_ ? points.pairs : pairs_of(frame, points));
+      const std::vector<PointPair> pairs =
+          points.matched_by == match_stereo_ ? points.pairs : pairs_of(frame, points);
+      constexpr std::size_t beginning = 3;  // frames; one can show nothing
+      if (record_.frames.size() <= beginning)
+        if (const auto why = mistaken_sides(rig_, options_.stereo, frame, points, pairs, options_.threads))
+          cairn::raise(frame.name + ": " + *why);
+      find_local_landmarks(pairs);
     });
     constexpr double usual = 0.1;  // [s], where the clock of a recording stands still
     const double dt = time_ ? frame.time - *time_ : usual;

@@ -30,10 +30,15 @@ class Played final : public Dataset {
 public:
   explicit Played(Recording recording) : recording_(std::move(recording)) {
     cairn::StereoRig& rig = recording_.rig;
-    if (rig.left.width() == 0)
-      rig.left = with_size(rig.left, example::read_image(recording_.frames.front().left));
-    if (rig.right.width() == 0)
-      rig.right = with_size(rig.right, example::read_image(recording_.frames.front().right));
+    const RecordedFrame& first = recording_.frames.front();
+    if (rig.left.width() == 0) rig.left = with_size(rig.left, example::read_image(first.left));
+    if (rig.right.width() > 0) return;
+    const cairn::Image right = example::read_image(first.right);
+    if (right.width() != rig.left.width() || right.height() != rig.left.height())
+      cairn::raise(first.right.string() + ": the image has " + size_text(right.width(), right.height()) +
+                   "; expected " + size_text(rig.left.width(), rig.left.height()) +
+                   " as the left one, where the calibration says no size of its own");
+    rig.right = with_size(rig.right, right);
   }
 
   [[nodiscard]] std::string name() const override { return recording_.name; }

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdint>
 #include <exception>
+#include <initializer_list>
 #include <iostream>
 #include <limits>
 #include <optional>
@@ -20,6 +21,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <cairn/core/check.hpp>
 #include <cairn/io/text.hpp>
 #include <cairn/version.hpp>
 
@@ -89,6 +91,14 @@ CLI::Validator one_of(std::vector<std::pair<std::string, Enumeration>> named) {
             return "expected one of " + names + ", found " + detail::shown(word);
           },
           names};
+}
+
+/// Throws cairn::Error naming an option that was given and would do nothing: one that is `for_what`, which is
+/// not so.
+inline void expect_absent(const CLI::App& app, std::initializer_list<const char*> options,
+                          const std::string& for_what) {
+  for (const char* option : options)
+    if (app.count(option) > 0) cairn::raise(std::string(option) + " is " + for_what);
 }
 
 /// Does a program's work, which returns an exit code. What it throws is said in a line, and so is a standard

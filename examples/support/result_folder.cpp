@@ -244,7 +244,7 @@ private:
 ResultFolder::ResultFolder(fs::path folder, Names names)
     : folder_(std::move(folder)), names_(std::move(names)) {}
 
-void ResultFolder::prepare() const {
+void ResultFolder::prepare(const std::vector<fs::path>& besides) const {
   std::error_code failure;
   fs::create_directories(folder_, failure);
   if (failure) refuse_folder(folder_, failure.message());
@@ -256,6 +256,16 @@ void ResultFolder::prepare() const {
     if (fs::is_directory(folder / name, failure))
       cairn::raise((folder_ / name).string() + ": is a folder; expected a file or nothing");
   const Staging proof(folder, names_, false);
+  for (auto file = besides.begin(); file != besides.end(); ++file) {
+    if (file->empty()) continue;
+    if (std::any_of(besides.begin(), file, [&](const fs::path& other) { return same_file(other, *file); }))
+      cairn::raise(file->string() + ": expected a name for each file that is to be written");
+    if (std::ranges::any_of(names_, [&](const std::string& name) { return same_file(folder / name, *file); }))
+      cairn::raise(file->string() + ": a result of the run has this name; expected another");
+    const fs::path into = file->has_parent_path() ? file->parent_path() : ".";
+    if (!fs::is_directory(into, failure) || fs::is_directory(*file, failure))
+      cairn::raise(file->string() + ": expected the name of a file in a folder that there is");
+  }
 }
 
 void ResultFolder::replace(const std::function<void(const fs::path& staging)>& fill) const {
@@ -280,12 +290,11 @@ void ResultFolder::replace(const std::function<void(const fs::path& staging)>& f
   deliver(folder / complete_inside, folder, names_);
 }
 
-void expect_file_can_be_made(const fs::path& file) {
-  if (file.empty()) return;
-  const fs::path folder = file.has_parent_path() ? file.parent_path() : ".";
+bool same_file(const fs::path& one, const fs::path& other) {
+  if (one.empty() || other.empty()) return false;
   std::error_code failure;
-  if (!fs::is_directory(folder, failure) || fs::is_directory(file, failure))
-    cairn::raise(file.string() + ": expected the name of a file in a folder that there is");
+  const fs::path a = fs::weakly_canonical(fs::absolute(one, failure), failure);
+  return !failure && a == fs::weakly_canonical(fs::absolute(other, failure), failure) && !failure;
 }
 
 }  // namespace example

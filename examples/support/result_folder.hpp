@@ -28,7 +28,9 @@ public:
 
   /// Makes the folder where it is missing, completes or removes what killed runs left, and proves that
   /// results can be written: before the work, not after it. Throws cairn::Error naming the folder and why.
-  void prepare() const;
+  /// `besides` are files that the run writes besides its results, or empty: each has to have a name of its
+  /// own in a folder that there is.
+  void prepare(const std::vector<std::filesystem::path>& besides = {}) const;
 
   /// Calls fill(staging), which writes files of these names into the folder `staging`. When it returns, those
   /// files are the results, and of `names` no other file is left. Throws cairn::Error, or what `fill` throws,
@@ -41,8 +43,7 @@ private:
   std::vector<std::string> names_;
 };
 
-/// A file that is written after the work, outside of the results: throws cairn::Error naming it, before the
-/// work, where it cannot be made by that name. Nothing where `file` is empty.
-void expect_file_can_be_made(const std::filesystem::path& file);
+/// Whether two names are of one file, or would be, were it made.
+[[nodiscard]] bool same_file(const std::filesystem::path& one, const std::filesystem::path& other);
 
 }  // namespace example

@@ -49,7 +49,7 @@ TEST_SUITE("calibrate_stereo/program") {
         [&](const std::string& mistake) {
           return run(mistake + " --out \"" + (folder / "out").string() + "\"");
         },
-        {"", left, left + right + " --square 0", left + right + " --corners 1 6",
+        {"", left, left + right + " --square 0", left + right + " --corners 2 2",
          left + right + " --corners 9", left + right + " --distortion 3", "--nonsense"});
     const Outcome none = run(left + right + " --out \"" + (folder / "out").string() + "\"");
     CHECK(none.code == 2);

@@ -103,6 +103,67 @@ TEST_SUITE("program") {
     CHECK(run("--frames -3").says("--frames: expected a whole number of at least 0, found '-3'"));
   }
 
+  TEST_CASE("stereo_slam: an option that would do nothing is refused") {
+    const cairn_test::Folder folder;
+    const std::string out = " --out \"" + (folder / "out").string() + "\"";
+    const std::string drive = "--dataset kitti_raw /nowhere";
+    for (const std::string& mistake :
+         {drive + " --script loop", drive + " --drift 1", drive + " --no-cache",
+          std::string("--dataset arena ."), std::string("--features orb --oriented")}) {
+      CAPTURE(mistake);
+      const Outcome outcome = run(mistake + out);
+      CAPTURE(outcome.words);
+      CHECK(outcome.code == 2);
+      CHECK((outcome.says(" is for ") || outcome.says("expected no folder")));
+    }
+    for (const char* option : {"--out x", "--store single", "--points 500", "--budget 5", "--oriented",
+                               "--calibrate on", "--motion ekf", "--features sift", "--live 0", "--save x",
+                               "--save-rig x", "--load x", "--load x --localise"}) {
+      CAPTURE(option);
+      const Outcome outcome = run("--dump \"" + (folder / "drive").string() + "\" " + option);
+      CAPTURE(outcome.words);
+      CHECK(outcome.code == 2);
+      CHECK(outcome.says(" is for a run, and --dump makes none"));
+    }
+    CHECK(names_in(folder.path()).empty());
+  }
+
+  TEST_CASE(
+      "stereo_slam: images of two sizes are named, and so are left and right mistaken for one another") {
+    const cairn_test::Folder folder;
+    make_drive(folder, 6);
+    const fs::path drive = folder / "drive";
+    const std::string arguments =
+        "--dataset kitti_odometry \"" + drive.string() + "\" --out \"" + (folder / "out").string() + "\"";
+    const auto shrink = [&](const char* name) {
+      example::write_png(drive / "image_1" / name, cairn::Image(384, 288, 100));
+    };
+    shrink("000004.png");
+    const Outcome later = run(arguments);
+    CAPTURE(later.words);
+    CHECK(later.code == 3);
+    CHECK(later.says("ended after 4 of 6 frames: "));
+    CHECK(later.says("000004.png: the image has 384 x 288 pixels; expected 768 x 576 pixels"));
+    shrink("000000.png");
+    fs::remove_all(folder / "out");
+    const Outcome first = run(arguments);
+    CAPTURE(first.words);
+    CHECK(first.code == 2);
+    CHECK(first.says(
+        "image_1/000000.png: the image has 384 x 288 pixels; expected 768 x 576 pixels as the left"));
+    fs::remove_all(drive);
+    make_drive(folder, 3);
+    fs::rename(drive / "image_0", drive / "right");
+    fs::rename(drive / "image_1", drive / "image_0");
+    fs::rename(drive / "right", drive / "image_1");
+    const Outcome exchanged = run(arguments);
+    CAPTURE(exchanged.words);
+    CHECK(exchanged.code == 2);
+    CHECK(exchanged.says("000000.png: "));
+    CHECK(exchanged.says("with left and right exchanged"));
+    CHECK_FALSE(fs::exists(folder / "out" / "summary.json"));
+  }
+
   TEST_CASE("stereo_slam: --version says which") {
     const Outcome version = run("--version");
     CHECK(version.code == 0);
@@ -166,8 +227,20 @@ TEST_SUITE("program") {
       CHECK(fs::exists(folder / "fourth" / "summary.json"));
       fs::remove_all(folder / "fourth");
     }
-    CHECK(
-        run("--frames 3 --save " + named("one") + " --save-rig " + named("one")).says("expected two names"));
+    CHECK(run("--frames 3 --save " + named("one") + " --save-rig " + named("one"))
+              .says("expected a name for each"));
+    for (const char* option : {"--save", "--save-rig"})
+      CHECK(run("--frames 3 --out " + named("first") + " " + option + " " + named("first/trajectory.tum"))
+                .says("first/trajectory.tum: a result of the run has this name; expected another"));
+    for (const char* calibrate : {"on", "drifting"}) {
+      const bool on = calibrate == std::string("on");
+      CAPTURE(calibrate);
+      const Outcome outcome =
+          run("--frames 2 --load " + named("map") + " --calibrate " + calibrate + " --out " + named("third"));
+      CHECK(outcome.code == (on ? 2 : 0));
+      CHECK(outcome.says("map: this map does not estimate its rig") == on);
+    }
+    fs::remove_all(folder / "third");
 
     tear(folder / "map");
     for (const char* bad : {"map", "none"}) {

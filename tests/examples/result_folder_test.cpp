@@ -250,6 +250,26 @@ TEST_SUITE("examples/result_folder") {
     CHECK(names_in(folder / "out") == Names{"c.txt"});
   }
 
+  TEST_CASE("result folder: what is written besides has a name of its own, in a folder that there is") {
+    const Folder folder;
+    const fs::path out = folder / "out";
+    const auto said_of = [&](const std::vector<fs::path>& besides) {
+      return message_of([&] { example::ResultFolder(out, results).prepare(besides); });
+    };
+    CHECK(said_of({"", folder / "map", out / "map", ""}).empty());
+    fs::create_directory_symlink(out, folder / "link");
+    folder.put("out/b.txt", "");
+    fs::create_symlink(out / "b.txt", folder / "file");
+    for (const fs::path& taken : {out / "a.txt", folder / "link" / "a.txt", out / ".." / "out" / "e.txt",
+                                  fs::relative(out / "c.txt"), folder / "file"})
+      CHECK(said_of({"", taken}) == taken.string() + ": a result of the run has this name; expected another");
+    CHECK(said_of({folder / "map", folder / "link" / ".." / "map"}).find(": expected a name for each file") !=
+          std::string::npos);
+    for (const fs::path& nowhere : {folder / "no" / "map", out, folder / "map" / ""})
+      CHECK(said_of({nowhere}) ==
+            nowhere.string() + ": expected the name of a file in a folder that there is");
+  }
+
   TEST_CASE("result folder: the folder of a living run is left alone, what a killed one left is not") {
     const Folder folder;
     const fs::path out = folder / "out";

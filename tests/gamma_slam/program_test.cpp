@@ -46,9 +46,9 @@ std::set<std::string> results() {
 TEST_SUITE("gamma_slam/program") {
   TEST_CASE("gamma_slam: a mistake is exit code 2 and a line") {
     const cairn_test::Folder folder;
-    for (const char* mistake :
-         {"--nonsense", "--particles 0", "--threads 0", "--seed -1", "--laps 0", "--cells stones",
-          "--drive nowhere", "--frames 3", "--cell-size 0", "--cell-size nan", "more words"}) {
+    for (const char* mistake : {"--nonsense", "--particles 0", "--threads 0", "--seed -1", "--laps 0",
+                                "--cells stones", "--drive nowhere", "--drive . --laps 2", "--frames 3",
+                                "--cell-size 0", "--cell-size nan", "more words"}) {
       CAPTURE(mistake);
       const Outcome outcome = run(std::string(mistake) + " --out \"" + (folder / "out").string() + "\"");
       CAPTURE(outcome.words);
@@ -63,6 +63,7 @@ TEST_SUITE("gamma_slam/program") {
   TEST_CASE("gamma_slam: --version and --help say what they are asked, or that they cannot") {
     CHECK(run("--version").words == "gamma_slam " CAIRN_VERSION_STRING "\n");
     CHECK(run("--help").says("--cell-size"));
+    CHECK(run("--help").says("=gamma_slam_out"));
     CHECK(run("--help", "/dev/full").code == 2);
   }
 

@@ -74,9 +74,12 @@ TEST_SUITE("grid_slam/program") {
          "--log " + named("empty"), "--log " + named("torn"), "--log " + named("nan"),
          "--log " + named("still"), "--log " + named("log") + " --relations " + named("log"),
          "--simulate --log " + named("log"), "--frame nowhere", "--frame start --map stop",
-         "--frame start --load " + named("log")},
+         "--frame start --load " + named("log"), "--log " + named("log") + " --save " + named("log")},
         300);
     CHECK_FALSE(fs::exists(folder / "out"));
+    CHECK(cairn::read_file(folder / "log") == short_log(3));
+    CHECK(run_there("--log " + named("log") + " --save " + named("out/map.pgm"))
+              .says("out/map.pgm: a result of the run has this name; expected another"));
   }
 
   TEST_CASE("grid_slam: --version and --help say what they are asked, or that they cannot") {
@@ -256,7 +259,7 @@ TEST_SUITE("grid_slam/program") {
         CAPTURE(by);
         CAPTURE(outcome.words);
         CHECK(outcome.code == 3);
-        CHECK(outcome.says("grid_slam: leap: ended after 30 of 40 scans: scan 31 (time 6"));
+        CHECK(outcome.says("grid_slam: leap: ended after 30 of 40 scans: scan 31 (line 31, time 6"));
         CHECK(names_in(folder / "out_leap") == results());
         const auto summary = nlohmann::json::parse(cairn::read_file(folder / "out_leap" / "summary.json"));
         CHECK(summary["scans"] == 30);

@@ -33,13 +33,14 @@ void check_mistakes(const Run& run, const std::vector<std::string>& mistakes, st
   }
 }
 
-/// --version and --help say what they are asked (`option` among it), or that they cannot.
+/// --version and --help say what they are asked (`option` among it, and defaults), or that they cannot.
 template <class Run>
 void check_version_and_help(const Run& run, const std::string& version, const std::string& option) {
   CHECK(run("--version", "").code == 0);
   CHECK(run("--version", "").words == version);
   CHECK(run("--help", "").code == 0);
   CHECK(run("--help", "").says(option));
+  CHECK(run("--help", "").says("=" + version.substr(0, version.find(' ')) + "_out"));
   for (const char* asked : {"--version", "--help"}) {
     const Outcome outcome = run(asked, "/dev/full");
     CHECK(outcome.code == 2);

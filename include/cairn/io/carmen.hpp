@@ -45,6 +45,7 @@ struct StampedScan {
   SE2 T_odom_laser;
   SE2 T_odom_robot;
   LaserScan scan;
+  std::size_t line = 0;  ///< of the file, the first is 1; 0 where there is none
 };
 
 /// A pose of the wheels' odometry.
@@ -256,6 +257,8 @@ inline StampedScan dp_slam_laser(CarmenFields fields, const TextLines& lines,
     else if (kind == "Laser")
       log.scans.push_back(
           detail::dp_slam_laser(detail::CarmenFields(lines), lines, std::exchange(dp_slam, {}), farthest));
+    for (std::vector<StampedScan>* scans : {&log.scans, &raw})
+      if (!scans->empty() && scans->back().line == 0) scans->back().line = lines.number();
   }
   if (log.scans.empty()) log.scans = std::move(raw);
   if (log.scans.empty())
