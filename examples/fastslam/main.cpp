@@ -126,7 +126,8 @@ void expect_use_of_all(const CLI::App& app, const Options& o) {
   if (o.data != "loop" && o.data != "map")
     expect_absent(app, {"--frames"}, "for simulated drives: --data loop and map");
   if (o.identities == "known") expect_absent(app, {"--association"}, "for --identities withheld");
-  if (o.proposal == "motion") expect_absent(app, {"--redraw"}, "for --proposal landmarks");
+  if (o.proposal == "motion" && o.slam.redraw_below > 0)
+    expect_absent(app, {"--redraw"}, "for --proposal landmarks");
 }
 
 }  // namespace
