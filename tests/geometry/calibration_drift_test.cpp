@@ -171,6 +171,13 @@ TEST_SUITE("calibration_drift") {
       const Matrix<5> whole = then.ahead(5).covariance(), sum = stepped.ahead(5).covariance();
       CHECK((whole - sum).cwiseAbs().maxCoeff() < 1e-9 * whole.cwiseAbs().maxCoeff());
     }
+    for (const double memory : {1e-300, 1e155, 1e300}) {  // whose squares are no numbers
+      CAPTURE(memory);
+      const CalibrationDrift turning(cairn_test::rectified_rig(),
+                                     {.walk_rotation = 0, .rate_sigma = 1e-4, .rate_memory = memory});
+      const double turned = memory < 1 ? 0 : 300 * 1e-4;
+      CHECK(turning.ahead(300).covariance()(0, 0) == doctest::Approx(1e-6 + turned * turned).epsilon(1e-9));
+    }
     CHECK(start.ahead(0).covariance() == start.covariance());
     CHECK(cairn_test::violation_of([&] { (void)start.ahead(-1); }) == "CalibrationDrift: cannot go back");
     const CalibrationDrift off(cairn_test::rectified_rig(), {.enabled = false});

@@ -224,6 +224,29 @@ TEST_SUITE("motion_calibration") {
       }
   }
 
+  TEST_CASE("CalibrationDrift: a knock is believed also where much more was seen before it") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    const RigCorrection correction(cairn_test::rectified_rig(0.5));
+    int believed = 0;
+    constexpr int runs = 20;
+    for (int run = 0; run < runs; ++run) {
+      cairn::CalibrationDrift drift(correction.nominal());
+      Vector<5> truth = Vector<5>::Zero();
+      const auto see = [&] {
+        return drift.update_moved(moved(correction.rig(truth), drive(2), 0.5, random, 100), drive(2));
+      };
+      for (int k = 0; k < 10; ++k) REQUIRE(see().good());  // each the next frame: hardly any walk
+      Vector<3> axis(random.normal(), random.normal(), random.normal());
+      truth.head<3>() += 0.006 * axis.normalized();
+      const MotionCalibration after = see();
+      const Vector<5> error = after.state - truth;
+      believed += after.good() && cairn_test::normalised_square(after.covariance, error) < 30;
+    }
+    CHECK(believed >= runs - 1);
+  }
+
   TEST_CASE("CalibrationDrift: points that move as no scene does are no knock") {
     cairn::Random random(cairn_test::seed());
     const RigCorrection correction(cairn_test::rectified_rig(0.5));

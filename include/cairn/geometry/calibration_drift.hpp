@@ -124,8 +124,8 @@ public:
 
   /// Takes points seen before and after a motion, `frames` frames apart; `guess` is about the motion. Sees
   /// the yaw. The epipolar constraints of these points are part of it: do not give them to update() as well.
-  /// Points that the foreseen rig cannot explain were seen after a knock: the correction starts again from
-  /// them alone. O(points).
+  /// Points that the foreseen rig cannot explain, or of which another one explains more by a twentieth, were
+  /// seen after a knock: the correction starts again from them alone. O(points).
   MotionCalibration update_moved(std::span<const MovedPair> pairs, const SE3& guess, int frames = 1,
                                  const MotionCalibrationOptions& options = {}) {
     CAIRN_EXPECTS(frames > 0, "CalibrationDrift: expected a motion of at least one frame");
@@ -136,7 +136,10 @@ public:
                                                     options);
     };
     auto result = told(state_, covariance_);
-    if (!result.good() || is_knock(result.state - state_)) {
+    const bool foreseen = result.good() && !is_knock(result.state - state_);
+    // A robust estimate may stay where it was and take for wrong the points that say otherwise, tens of them.
+    const std::size_t few = pairs.size() / 20;
+    if (!foreseen || pairs.size() - result.inliers > 2 * few) {
       State unmoved = state_;
       unmoved.tail<3>().setZero();
       // As vague as it takes, up to this [rad].
@@ -145,6 +148,7 @@ public:
         const auto anew = told(unmoved, initial(sigma, options_.initial_sigma));
         const Vector<3> turn = part_of<3, 1>(State(anew.state - unmoved), 0, 0);
         if (!anew.good() || turn.cwiseAbs().maxCoeff() > 2 * sigma) continue;
+        if (foreseen && anew.inliers <= result.inliers + few) continue;
         result = anew;
         break;
       }
@@ -217,7 +221,7 @@ private:
     for (int i = 0; i < 5; ++i) covariance_(i, i) += t * (i < 3 ? rotation : baseline);
     const double cross = rate * integral * integral / memory;
     for (int i = 0; i < 3; ++i) {
-      covariance_(i, i) += rate * memory * memory * spread(a);
+      covariance_(i, i) += rate * spread(t, memory);
       covariance_(i, 5 + i) += cross;
       covariance_(5 + i, i) += cross;
       covariance_(5 + i, 5 + i) += -rate * std::expm1(-2 * a);
@@ -225,10 +229,11 @@ private:
     covariance_ = symmetrised(covariance_);
   }
 
-  /// 2 a - 3 + 4 exp(-a) - exp(-2 a), which is two thirds of a^3 where a is small.
-  [[nodiscard]] static double spread(double a) noexcept {
-    const double e = std::expm1(-a);
-    return a < 1e-2 ? a * a * a * (2.0 / 3 - a / 2) : 2 * (a + e) - e * e;
+  /// memory^2 (2 a - 3 + 4 exp(-a) - exp(-2 a)) for a = t / memory, also where the square overflows. In the
+  /// brackets is two thirds of a^3 where a is small.
+  [[nodiscard]] static double spread(double t, double memory) noexcept {
+    const double a = t / memory, lost = memory * std::expm1(-a);
+    return a < 1e-2 ? t * t * a * (2.0 / 3 - a / 2) : 2 * memory * (t + lost) - lost * lost;
   }
 
   [[nodiscard]] Innovation innovation(const Rays& pair) const {
