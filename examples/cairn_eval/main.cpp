@@ -46,9 +46,9 @@ std::set<std::string> keys(const std::map<std::string, Value>& map) {
 }
 
 void add_options(CLI::App& app, Options& o) {
-  app.option_defaults()->always_capture_default();
   app.add_option("truth", o.truth, "the true trajectory: TUM, KITTI or EuRoC")->required();
   app.add_option("estimates", o.estimates, "estimates of it, one file or more")->required();
+  app.option_defaults()->always_capture_default();
   app.add_option("--names", o.names, "of the estimates, for tables and pictures; else those of their files")
       ->default_str("");
   app.add_option(

@@ -41,6 +41,8 @@ TEST_SUITE("io/carmen") {
     REQUIRE(log.odometry.size() == 1);
     const StampedScan& a = log.scans[0];
     CHECK(a.time == 10.5);
+    CHECK(a.line == 3);
+    CHECK(log.scans[1].line == 4);
     CHECK(a.T_odom_laser.x() == 1);
     CHECK(a.T_odom_robot.angle() == 0.6);
     CHECK(a.scan.angle(0) == doctest::Approx(-std::numbers::pi / 2));
@@ -66,6 +68,7 @@ TEST_SUITE("io/carmen") {
     const StampedScan& a = log.scans[0];
     CHECK(a.time == 0);
     CHECK(log.scans[1].time == 1);
+    CHECK(log.scans[1].line == 4);
     CHECK(a.T_odom_laser.x() == 1);
     CHECK(a.T_odom_robot.angle() == 0.5);
     CHECK(a.scan.kind(0) == BeamKind::hit);
