@@ -160,7 +160,12 @@ void Lesson::write_results() {
 }
 
 int Lesson::finish() {
-  write_results();
+  try {
+    write_results();
+  } catch (const std::exception& error) {  // nobody above catches: what was half written would stay
+    std::cerr << info_.name << ": " << error.what() << std::endl;
+    return exit_mistake;
+  }
   std::string names;
   for (const std::string& name : wrong_) names += (names.empty() ? "" : ", ") + name;
   if (verdicts_ == 0) names = "nothing was judged";

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -206,6 +207,18 @@ TEST_CASE("lesson: results that cannot be written are exit code 2 and a sentence
   CHECK(cairn_test::run_program(first_lesson + " --quiet --out '" + (folder / "out").string() + "'",
                                 "/dev/full")
             .code == 2);
+}
+
+TEST_CASE("lesson: results that have no room leave nothing half written") {
+  const cairn_test::Folder folder;
+  const Outcome outcome = cairn_test::run_program("ulimit -f 16 && trap '' XFSZ && " + first_lesson +
+                                                  " --out '" + (folder / "out").string() + "'");
+  CAPTURE(outcome.words);
+  CHECK(outcome.code == 2);
+  CHECK(outcome.says("01_building_height: "));
+  CHECK_FALSE(outcome.says("verdict"));
+  CHECK(cairn_test::names_in(folder.path()) == std::set<std::string>{"out"});
+  CHECK(cairn_test::names_in(folder / "out").empty());
 }
 
 TEST_CASE("lesson: --help, --version and --about answer and write nothing") {

@@ -37,6 +37,18 @@ using cairn_test::DenseJoint;
 
 using Belief = JointGaussian<SE2, Vector<2>, Vector<1>>;
 
+/// Whether no number follows from the others: elsewhere a step may contradict itself, and what it says of the
+/// rest depends on rounding.
+bool independent(const Matrix<cairn::dynamic>& covariance) {
+  Matrix<cairn::dynamic> left = covariance;
+  for (Eigen::Index k = 0; k < left.rows(); ++k) {
+    if (!(left(k, k) > 1e-9 * covariance(k, k))) return false;
+    for (Eigen::Index i = k + 1; i < left.rows(); ++i)
+      for (Eigen::Index j = k + 1; j < left.rows(); ++j) left(i, j) -= left(i, k) * left(k, j) / left(k, k);
+  }
+  return true;
+}
+
 /// The belief, the oracle, and what the two call the same block.
 struct Program {
   explicit Program(std::uint64_t seed, const JointExtended& options) : random(seed), filter(options) {
@@ -235,6 +247,7 @@ struct Program {
     for (const int i : named) blocks.push_back(ids[static_cast<std::size_t>(i)]);
     const Matrix<cairn::dynamic> prior = belief.covariance(blocks);
     const int d = static_cast<int>(prior.rows());
+    if (!independent(prior)) return;
     bool beside_considered = false;
     for (int i = 0; i < count(); ++i)
       beside_considered = beside_considered || (belief.considered(ids[static_cast<std::size_t>(i)]) &&

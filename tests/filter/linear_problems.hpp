@@ -53,6 +53,13 @@ struct LinearProblem {
         prior{random_matrix<N, 1, S>(random), random_covariance<N, S>(random)} {
     for (int j = 0; N > 1 && j < M; ++j) sensor.design(j, N - 1) = S(0);
   }
+  /// One whose state does not grow for ever, as that of one seed in a few does: for thousands of steps.
+  [[nodiscard]] static LinearProblem lasting(cairn::Random& random) {
+    LinearProblem problem(random);
+    if (const S size = problem.process.transition.norm(); size > S(0.95))
+      problem.process.transition *= S(0.95) / size;
+    return problem;
+  }
 };
 
 /// Level and slope of a line through three points, seen one by one with variance 0.25: where a filter that

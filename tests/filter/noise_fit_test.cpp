@@ -58,7 +58,7 @@ TEST_SUITE("noise_fit") {
     const auto seed = cairn_test::seed();
     CAPTURE(seed);
     cairn::Random random(seed);
-    const cairn_test::LinearProblem<2, 2> p(random);
+    const auto p = cairn_test::LinearProblem<2, 2>::lasting(random);
     cairn::NoiseRecord<cairn::LinearModel<2>, cairn::LinearSensor<2, 2>> record{p.prior, std::nullopt, {}};
     Vector<2> x = cairn::sample(p.prior, random);
     for (int k = 0; k < 2000; ++k) {
@@ -70,6 +70,7 @@ TEST_SUITE("noise_fit") {
     auto sensor = p.sensor;
     sensor.covariance = Matrix<2>::Identity();
     const auto fit = cairn::fit_noise(record, p.process, sensor, {.rounds = 100, .process = false});
+    REQUIRE_FALSE(fit.log_likelihoods.empty());
     for (std::size_t k = 1; k < fit.log_likelihoods.size(); ++k)
       CHECK(fit.log_likelihoods[k] >= fit.log_likelihoods[k - 1] - 1e-8);
     CHECK(fit.process == p.process.covariance);

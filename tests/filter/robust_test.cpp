@@ -142,7 +142,7 @@ TEST_SUITE("robust") {
     const auto seed = cairn_test::seed();
     CAPTURE(seed);
     cairn::Random random(seed);
-    const LinearProblem<2, 2> p(random);
+    const auto p = LinearProblem<2, 2>::lasting(random);
     const Matrix<2> truth = (Matrix<2>() << 1.0, 0.4, 0.4, 0.5).finished();
     const Matrix<2> root = cairn_test::lower_root(truth);
     auto learner = p.sensor;

@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -290,9 +291,9 @@ TEST_SUITE("line triangulation") {
     cairn::Random random(seed);
     const auto cameras = three_cameras();
     constexpr int runs = 500;
-    constexpr double sigma = 0.5;
+    constexpr double sigma = 0.1;  // a covariance is one to first order
     double nees = 0, chi2 = 0;
-    for (int run = 0; run < runs; ++run) {
+    for (int run = 0; run < runs;) {
       const auto [a, b] = ends(random, 3, 12);
       std::vector<LineView> views;
       for (const LineCamera& c : cameras) {
@@ -301,15 +302,19 @@ TEST_SUITE("line triangulation") {
           *end += Vector<2>(random.normal(0, sigma), random.normal(0, sigma));
         views.push_back({&c, s});
       }
+      if (std::ranges::any_of(views,
+                              [](const LineView& v) { return (v.segment.to - v.segment.from).norm() < 10; }))
+        continue;  // seen from its end
       const auto found = cairn::triangulate_line(views, {.sigma = sigma});
       REQUIRE(found.good());
+      ++run;
       Vector<4> error = cairn::local(found.line, Line::through(a, b));
       if (error.head<2>().norm() > 1.6) error = cairn::local(found.line, Line::through(b, a));
       nees += error.dot(found.covariance.inverse() * error) / runs;
       chi2 += found.chi2 / runs;
     }
-    CHECK(cairn::chi_square_mean_band(4, runs, 0.999).contains(nees));
-    CHECK(cairn::chi_square_mean_band(2, runs, 0.999).contains(chi2));
+    CHECK(cairn::chi_square_mean_band(4, runs, cairn_test::almost_sure).contains(nees));
+    CHECK(cairn::chi_square_mean_band(2, runs, cairn_test::almost_sure).contains(chi2));
   }
 }
 
@@ -323,6 +328,7 @@ TEST_SUITE("anchored line") {
       const SE3 anchor(SO3::exp(some_direction(random)), somewhere(random, 20));
       const auto [a, b] = ends(random, 2, 30);
       const LineSegment normalised{{a(0) / a(2), a(1) / a(2)}, {b(0) / b(2) + 0.01, b(1) / b(2)}};
+      if ((normalised.to - normalised.from).norm() < 0.05) continue;  // the rays would be beside it
       const auto x = cairn::AnchoredLine::at(anchor, normalised, Line::through(a, b));
       REQUIRE(x);
       const Line line = x->line();

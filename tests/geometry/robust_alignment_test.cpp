@@ -65,7 +65,7 @@ TEST_SUITE("robust_alignment") {
         CHECK(a.inlier_count >= 90 - outliers);
       }
       CAPTURE(nees);
-      CHECK(cairn::chi_square_mean_band(6, runs, 0.999).contains(nees));
+      CHECK(cairn::chi_square_mean_band(6, runs, cairn_test::almost_sure).contains(nees));
     }
   }
 
@@ -96,7 +96,8 @@ TEST_SUITE("robust_alignment") {
     CHECK(align_robustly(pairs(SE3(), 100, random)).status == RobustAlignmentStatus::no_consensus);
     auto mirrored = pairs(SE3(), 0, random);
     for (PointMatch& pair : mirrored) pair.target(0) = -pair.target(0);
-    CHECK_FALSE(align_robustly(mirrored).good());
+    // Those about a plane agree with a turn about it, up to a tenth of them by chance.
+    CHECK_FALSE(align_robustly(mirrored, {.min_share = 0.3}).good());
     std::vector<PointMatch> line(20);
     for (std::size_t i = 0; i < line.size(); ++i)
       line[i].source = line[i].target = Vector<3>::Constant(static_cast<double>(i));

@@ -116,7 +116,7 @@ TEST_SUITE("stereo_pose") {
     CAPTURE(seed);
     cairn::Random random(seed);
     constexpr int runs = 300;
-    const auto band = cairn::chi_square_mean_band(6, runs, 0.9999);  // twelve are tested
+    const auto band = cairn::chi_square_mean_band(6, runs, cairn_test::almost_sure);
     for (const StereoRig& rig : {cairn_test::rectified_rig(), cairn_test::unrectified_rig()})
       for (const cairn::RobustLoss loss :
            {cairn::RobustLoss::none, cairn::RobustLoss::huber, cairn::RobustLoss::cauchy})
@@ -199,7 +199,7 @@ TEST_SUITE("stereo_pose") {
       with += left.squaredNorm();
       without += cairn::local(T, estimate_stereo_pose(rig, matches).T_world_camera).squaredNorm();
     }
-    CHECK(cairn::chi_square_mean_band(6, runs, 0.999).contains(nees));
+    CHECK(cairn::chi_square_mean_band(6, runs, cairn_test::almost_sure).contains(nees));
     CHECK(with < without);
   }
 
@@ -270,7 +270,7 @@ TEST_SUITE("stereo_pose") {
       const Vector<6> error = cairn::local(T, pose.T_world_camera);
       nees += error.dot(pose.information * error) / runs;
     }
-    CHECK(cairn::chi_square_mean_band(6, runs, 0.999).contains(nees));
+    CHECK(cairn::chi_square_mean_band(6, runs, cairn_test::almost_sure).contains(nees));
   }
 
   TEST_CASE("stereo residual: gradient and information are the derivatives of chi squared") {
@@ -419,7 +419,7 @@ TEST_SUITE("stereo_pose") {
     }
     CAPTURE(nees / good);
     CHECK(good >= 0.9 * runs);
-    CHECK(nees / good < 1.3 * cairn::chi_square_mean_band(6, good, 0.999).high);
+    CHECK(nees / good < 1.3 * cairn::chi_square_mean_band(6, good, cairn_test::almost_sure).high);
   }
 
   // Against differences of the pixels' own derivatives.

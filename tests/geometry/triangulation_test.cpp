@@ -82,8 +82,7 @@ TEST_SUITE("triangulation") {
           nees += cairn_test::normalised_square(t.covariance, error) / runs;
           gaps.add(t.gap);
         }
-        // 99.9 % band: eighteen of these are tested with every seed
-        CHECK(cairn::chi_square_mean_band(3, runs, 0.999).contains(nees));
+        CHECK(cairn::chi_square_mean_band(3, runs, cairn_test::almost_sure).contains(nees));
         CHECK(gaps.standard_deviation() == doctest::Approx(1).epsilon(0.1));
       }
   }
@@ -95,6 +94,7 @@ TEST_SUITE("triangulation") {
     CAPTURE(seed);
     cairn::Random random(seed);
     std::vector<double> errors[3];  // medians: a few points near the epipole would rule a mean
+    int nearer = 0;                 // by its weights, of the same pixels: the medians differ by a thousandth
     for (int run = 0; run < 3000; ++run) {
       const Vector<3> p = cairn_test::visible_point(rig, random, 2.5, 4);
       Vector<4> x = *rig.project(p);
@@ -104,8 +104,9 @@ TEST_SUITE("triangulation") {
             cairn::triangulate(rig, x.head<2>(), x.tail<2>(), {.method = methods[m], .max_gap = 100});
         if (t.good()) errors[m].push_back((t.point - p).norm());
       }
+      nearer += errors[1].back() < errors[0].back() ? 1 : 0;
     }
-    CHECK(cairn::median(errors[1]) < cairn::median(errors[0]));
+    CHECK(nearer > 0.55 * 3000);  // 0.64; one standard deviation is 0.009
     CHECK(cairn::median(errors[2]) < 1.02 * cairn::median(errors[1]));
   }
 

@@ -65,12 +65,12 @@ bool same_all(const Hits& hits, const std::vector<double>& expected, std::size_t
 /// A radius between two different distances, so that rounding does not decide who is within.
 double radius_between(const std::vector<double>& distances, cairn::Random& random) {
   if (distances.empty()) return 1;
-  const std::size_t i = random.below(distances.size());
+  std::size_t i = random.below(distances.size());
+  while (i + 1 < distances.size() && distances[i + 1] <= 1.0001 * distances[i]) ++i;
   const double low = distances[i];
-  const auto next =
-      std::find_if(distances.begin(), distances.end(), [&](double d) { return d > low * 1.001; });
-  return next == distances.end() ? 1.01 * low + 1
-                                 : std::sqrt(low * *next + 1e-30) + (low == 0 ? *next / 2 : 0);
+  if (i + 1 == distances.size()) return 1.01 * low + 1;
+  const double next = distances[i + 1];
+  return std::sqrt(low * next + 1e-30) + (low == 0 ? next / 2 : 0);
 }
 
 template <class Real>

@@ -22,7 +22,7 @@ Outcome run(const std::string& command, const std::string& standard_output = "")
 
 const std::vector<std::string> scripts{"benchmark",  "docs",   "check_headers", "check_layers",
                                        "check_tidy", "course", "include_cost",  "install",
-                                       "scoreboard", "test"};
+                                       "scoreboard", "test",   "mutants",       "ci-full"};
 
 }  // namespace
 
@@ -39,19 +39,36 @@ TEST_SUITE("scripts") {
     }
     CHECK(run("scoreboard main_job --help").words == run("scoreboard --help").words);
     CHECK(run("scoreboard index --preset release low -h").words == run("scoreboard --help").words);
+    CHECK(run("demo --frames 3 --version").words == "cairn " CAIRN_VERSION_STRING "\n");
+    CHECK(run("demo --help").code == 0);
     CHECK(run("benchmark --full --version").words == "cairn " CAIRN_VERSION_STRING "\n");
   }
 
   TEST_CASE("scripts: what they do not know is exit code 2 and a line that names it") {
     std::vector<std::string> mistakes;
     for (const std::string& script : scripts) mistakes.push_back(script + " --nonsense");
-    for (const char* mistake :
-         {"check_headers nonsense", "install", "install nonsense", "install test nonsense", "scoreboard",
-          "scoreboard nonsense", "scoreboard main_job nonsense", "scoreboard index low nonsense",
-          "scoreboard fastslam robots nonsense", "scoreboard index --preset nonsense", "benchmark --only",
-          "benchmark --preset nonsense", "include_cost nonsense", "include_cost cairn/nonsense.hpp",
-          "course nonsense", "course 01 nonsense", "course 01 --seed nonsense", "course 01 --steps=nonsense",
-          "course --seed"})
+    for (const char* mistake : {"check_headers nonsense",
+                                "mutants nonsense",
+                                "fuzz",
+                                "fuzz nonsense",
+                                "install",
+                                "install nonsense",
+                                "install test nonsense",
+                                "scoreboard",
+                                "scoreboard nonsense",
+                                "scoreboard main_job nonsense",
+                                "scoreboard index low nonsense",
+                                "scoreboard fastslam robots nonsense",
+                                "scoreboard index --preset nonsense",
+                                "benchmark --only",
+                                "benchmark --preset nonsense",
+                                "include_cost nonsense",
+                                "include_cost cairn/nonsense.hpp",
+                                "course nonsense",
+                                "course 01 nonsense",
+                                "course 01 --seed nonsense",
+                                "course 01 --steps=nonsense",
+                                "course --seed"})
       mistakes.emplace_back(mistake);
     for (const std::string& mistake : mistakes) {
       CAPTURE(mistake);

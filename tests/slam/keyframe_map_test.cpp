@@ -12,6 +12,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/random.hpp>
+#include <cairn/geometry/triangulation.hpp>
 #include <cairn/slam/keyframe_map.hpp>
 
 #include "simulated_arena.hpp"
@@ -33,7 +34,8 @@ using cairn_test::ArenaFrame;
 
 constexpr double sigma = 0.5;
 
-/// Keyframes side by side that look at the same points, and where each sees them.
+/// Keyframes side by side that look at the same points, and where each sees them. The first sees pairs that
+/// make points: one pair in 400 has a gap of more than three deviations between its rays, and is no landmark.
 struct Scene {
   std::vector<SE3> poses;
   std::vector<Vector<3>> points;
@@ -43,6 +45,7 @@ struct Scene {
 Scene scene(std::uint64_t seed, int poses, int points, double noise = sigma) {
   cairn::Random random(seed);
   const cairn::StereoRig rig = cairn_test::arena_rig();
+  const cairn::Triangulator triangulate(rig);
   Scene result;
   for (int k = 0; k < poses; ++k)
     result.poses.push_back(SE3(cairn::SO3::exp(Vector<3>(0.01 * k, 0.03 * k, -0.02 * k)),
@@ -58,10 +61,12 @@ Scene scene(std::uint64_t seed, int poses, int points, double noise = sigma) {
       StereoSighting s;
       s.landmark = static_cast<std::uint32_t>(i);
       s.sigma = sigma;
-      for (int c = 0; c < 2; ++c) {
-        s.left(c) = pixels(c) + noise * random.normal();
-        s.right(c) = pixels(2 + c) + noise * random.normal();
-      }
+      do {
+        for (int c = 0; c < 2; ++c) {
+          s.left(c) = pixels(c) + noise * random.normal();
+          s.right(c) = pixels(2 + c) + noise * random.normal();
+        }
+      } while (result.seen.size() == 1 && !triangulate(s.left, s.right, sigma, sigma).good());
       result.seen.back().push_back(s);
     }
   }
@@ -159,6 +164,13 @@ double most_off(const Matrix<dynamic>& found, const Matrix<dynamic>& expected) {
   return (ratio - Matrix<dynamic>::Identity(found.rows(), found.cols())).cwiseAbs().maxCoeff();
 }
 
+/// What the mean NEES of so many runs stays below, once in 20,000 not. The poses of a run share the errors of
+/// a few keyframes, so that its mean scatters like a single one: over 38 arenas by 3, a single one by
+/// sqrt(12).
+double most_nees(int runs = 1) {
+  return cairn::chi_square_mean_band(6, runs, 0.9999).high;
+}
+
 cairn_test::ArenaRun drive(const cairn_test::ArenaOptions& arena, const KeyframeMapOptions& options = {}) {
   KeyframeMap map(cairn_test::arena_rig(), options);
   return cairn_test::run_arena(cairn_test::arena_frames(arena), map);
@@ -191,15 +203,18 @@ TEST_SUITE("keyframe_map") {
       CHECK((sum - Matrix<3>::Identity()).norm() < 1e-9);
       auto moved = landmark;
       Vector<3> expected = Vector<3>::Zero();
+      double each = 0;  // they may cancel, what is left of them does not
       for (std::size_t k = 0; k < poses.size(); ++k) {
         Vector<6> xi;
         for (int c = 0; c < 6; ++c) xi(c) = 1e-5 * random.normal();
         poses[k] = SE3::exp(xi) * poses[k];
-        expected += landmark.F[k] * cairn::moved_with_world(landmark.x, xi.data());
+        const Vector<3> part = landmark.F[k] * cairn::moved_with_world(landmark.x, xi.data());
+        expected += part;
+        each += part.norm();
       }
       REQUIRE(moved.solve(view));
       // What is left is second order: of the step, and of the residuals times it.
-      CHECK((moved.x - landmark.x - expected).norm() < 0.12 * expected.norm() + 1e-7);
+      CHECK((moved.x - landmark.x - expected).norm() < 0.12 * each + 1e-7);
     }
   }
 
@@ -393,7 +408,7 @@ TEST_SUITE("keyframe_map") {
     CHECK(std::sqrt(rig->covariance(1, 1)) < 1e-4);
     CHECK(learning.lost == 0);
     CHECK(learning.rms_position < 0.5 * trusting.rms_position);
-    CHECK(learning.mean_nees() < 14);
+    CHECK(learning.mean_nees() < most_nees());
   }
 
   TEST_CASE(
@@ -470,8 +485,8 @@ TEST_SUITE("keyframe_map") {
     const auto known = cairn_test::run_arena(frames, exact),
                learned = cairn_test::run_arena(frames, learning);
     CHECK(learned.lost == 0);
-    CHECK(learned.rms_position < known.rms_position + 0.01);
-    CHECK(learned.mean_nees() < 13);
+    CHECK(learned.rms_sigma < known.rms_sigma + 0.01);  // 1 cm, and the errors are what it says
+    CHECK(learned.mean_nees() < most_nees());
   }
 
   TEST_CASE("keyframe_map: a landmark's covariance in the world holds the errors of its keyframes") {
@@ -501,13 +516,13 @@ TEST_SUITE("keyframe_map") {
       CAPTURE(run);
       CHECK(result.lost == 0);
       CHECK(result.mean_nees() > 2.5);
-      CHECK(result.mean_nees() < 12);
+      CHECK(result.mean_nees() < most_nees());
       CHECK(result.rms_position < 0.01);
       CHECK(result.keyframes[210] == result.keyframes.back());  // the second lap meets the first
       sum += result.mean_nees() / 3;
     }
     CHECK(sum > 3.5);
-    CHECK(sum < 9);
+    CHECK(sum < most_nees(3));
   }
 
   TEST_CASE("keyframe_map: noise that stays while a landmark is in view does not fool it") {
@@ -515,7 +530,7 @@ TEST_SUITE("keyframe_map") {
     CAPTURE(seed);
     const auto result = drive({.seed = seed, .bias_share = 0.5});
     CHECK(result.mean_nees() > 2);
-    CHECK(result.mean_nees() < 10);
+    CHECK(result.mean_nees() < most_nees());
   }
 
   TEST_CASE("keyframe_map: stays true where every frame becomes a keyframe") {

@@ -159,6 +159,7 @@ struct ArenaRun {
   std::vector<double> off;             ///< how far each pose is from the true one [m]
   std::vector<std::size_t> keyframes;  ///< after each frame
   double rms_position = 0;
+  double rms_sigma = 0;  ///< what the covariances make of it, whatever the noise of this run
   int lost = 0;
   [[nodiscard]] double mean_nees(std::size_t begin = 0,
                                  std::size_t end = static_cast<std::size_t>(-1)) const {
@@ -182,7 +183,7 @@ inline ArenaRun run_arena(const std::vector<ArenaFrame>& frames, cairn::Keyframe
   for (const cairn::StereoSighting& s : frames[0].sightings) static_cast<void>(map.add_landmark(s));
   cairn::SE3 pose;
   int since = 0;
-  double squares = 0;
+  double squares = 0, variances = 0;
   for (std::size_t f = 1; f < frames.size(); ++f) {
     std::vector<cairn::StereoSighting> known, unknown;
     std::vector<cairn::StereoMatch> matches;
@@ -209,6 +210,7 @@ inline ArenaRun run_arena(const std::vector<ArenaFrame>& frames, cairn::Keyframe
     run.last_covariance = here.covariance;
     run.off.push_back(error.head<3>().norm());
     squares += error.head<3>().squaredNorm();
+    variances += here.covariance.topLeftCorner<3, 3>().trace();
     const double share =
         static_cast<double>(unknown.size()) / static_cast<double>(frames[f].sightings.size());
     if (share > rule.unknown && since >= rule.apart && map.add_keyframe(here, known)) {
@@ -218,6 +220,7 @@ inline ArenaRun run_arena(const std::vector<ArenaFrame>& frames, cairn::Keyframe
     run.keyframes.push_back(map.keyframe_count());
   }
   run.rms_position = std::sqrt(squares / static_cast<double>(run.nees.size()));
+  run.rms_sigma = std::sqrt(variances / static_cast<double>(run.nees.size()));
   return run;
 }
 

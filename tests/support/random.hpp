@@ -20,4 +20,8 @@ inline std::uint64_t seed(std::uint64_t usual = 1) {
   return text != nullptr ? std::stoull(text) : usual;
 }
 
+/// The level of a statistical band that has to hold under any seed: all tests together look at a few hundred
+/// numbers a seed, so that one seed in some thousands is red by chance.
+inline constexpr double almost_sure = 1 - 1e-6;
+
 }  // namespace cairn_test

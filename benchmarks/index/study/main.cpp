@@ -62,7 +62,7 @@ std::variant<Options, int> parse(int argc, char** argv) {
       options.out = argv[++i];
     } else if (word == "--help" || word == "-h" || word == "--version") {
       std::cout << (word == "--version" ? "index_study " CAIRN_VERSION_STRING "\n" : usage);
-      return cairn_bench::flush_standard_output("index_study") ? 0 : 1;
+      return cairn_bench::flush_standard_output("index_study") ? 0 : 2;
     } else {
       std::cerr << "index_study: '" << word << "' is no option, or lacks its value\n" << usage;
       return 2;
@@ -183,8 +183,8 @@ int main(int argc, char** argv) try {
     std::cerr << "index_study: " << wrong << " answers were wrong\n";
     return 1;
   }
-  return cairn_bench::flush_standard_output("index_study") ? 0 : 1;
+  return cairn_bench::flush_standard_output("index_study") ? 0 : 2;
 } catch (const std::exception& error) {
   std::cerr << "index_study: " << error.what() << '\n';
-  return 1;
+  return 2;
 }

@@ -24,6 +24,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <span>
 #include <utility>
 #include <vector>
@@ -113,8 +114,9 @@ public:
     health.distance_before = typical_distance(rays);
     if (options_.enabled && !rays.empty()) {
       walk(1);
-      if (surprised(rays)) start_again(rays, health.distance_before);
-      for (const Rays& pair : rays) (absorb(pair) ? health.used : health.gated) += 1;
+      const double limit = surprised(rays) ? start_again(rays, health.distance_before)
+                                           : std::numeric_limits<double>::infinity();
+      for (const Rays& pair : rays) (absorb(pair, limit) ? health.used : health.gated) += 1;
       covariance_ = symmetrised(covariance_);
     }
     health.distance_after = typical_distance(rays);
@@ -259,10 +261,12 @@ private:
     return result;
   }
 
-  /// One scalar Kalman update; false where the gate refuses the pair.
-  bool absorb(const Rays& pair) {
+  /// One scalar Kalman update; false where the gate refuses the pair, or it is off by more than `limit` noise
+  /// deviations.
+  bool absorb(const Rays& pair, double limit) {
     const Innovation z = innovation(pair);
-    if (!(z.value * z.value <= options_.gate * options_.gate * z.variance)) return false;
+    if (!(z.value * z.value <= options_.gate * options_.gate * z.variance && std::abs(z.value) <= limit))
+      return false;
     state_ += z.PHt * (z.value / z.variance);
     covariance_ -= product_transposed(z.PHt, z.PHt) / z.variance;
     return true;
@@ -283,8 +287,9 @@ private:
 
   /// Makes the covariance as wide as the residuals are, and leads the state into the basin of most pairs:
   /// reweighted least squares (Cauchy) whose scale follows the median residual down. Nothing where it does
-  /// not come down to half of the `distance` there was: no rig explains them.
-  void start_again(const std::vector<Rays>& rays, double distance) {
+  /// not come down to half of the `distance` there was: no rig explains them. By how many noise deviations a
+  /// pair may be off from there: the wide covariance would let through wrong ones as well.
+  double start_again(const std::vector<Rays>& rays, double distance) {
     const State known = state_;
     const Covariance known_covariance = covariance_;
     const double focal = 0.5 * (correction_.nominal().left.fy() + correction_.nominal().right.fy());
@@ -293,9 +298,12 @@ private:
     state_.tail<3>().setZero();
     const State before = state_;
     std::vector<double> sizes(rays.size());
-    for (int step = 0; step < 10; ++step) {
+    const auto typical_size = [&] {
       for (std::size_t i = 0; i < rays.size(); ++i) sizes[i] = std::abs(innovation(rays[i]).value);
-      const double scale = std::max(1.0, 1.4826 * median(sizes));
+      return std::max(1.0, 1.4826 * median(sizes));
+    };
+    for (int step = 0; step < 10; ++step) {
+      const double scale = typical_size();
       Covariance information = Covariance::Identity() / (sigma * sigma);
       State gradient = (before - state_) / (sigma * sigma);
       for (const Rays& pair : rays) {
@@ -309,7 +317,9 @@ private:
     if (typical_distance(rays) > 0.5 * distance) {
       state_ = known;
       covariance_ = known_covariance;
+      return std::numeric_limits<double>::infinity();
     }
+    return options_.gate * typical_size();
   }
 
   [[nodiscard]] double typical_distance(const std::vector<Rays>& rays) const {
