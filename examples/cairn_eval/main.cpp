@@ -94,14 +94,18 @@ void check(const Options& o) {
 std::vector<NamedEvaluation> evaluate_all(const Options& o) {
   const TrajectoryFile truth = read_trajectory(o.truth, formats.at(o.truth_format), o.times);
   std::vector<NamedEvaluation> all;
+  bool takes_times = truth.format == Format::kitti;
   for (std::size_t i = 0; i < o.estimates.size(); ++i) {
     const TrajectoryFile estimate = read_trajectory(o.estimates[i], formats.at(o.format), o.times);
+    takes_times = takes_times || estimate.format == Format::kitti;
     const bool covers = !o.covariances.empty() && o.covariances[i] != "-";
     all.push_back(
         {o.names.empty() ? estimate.path.stem().string() : o.names[i],
          evaluate(truth, estimate, covers ? std::optional(read_covariances(o.covariances[i])) : std::nullopt,
                   o.evaluation)});
   }
+  if (!o.times.empty() && !takes_times)
+    cairn::raise("--times is for KITTI files, which have no times of their own");
   return all;
 }
 

@@ -59,6 +59,13 @@ struct LandmarkLog {
   std::vector<std::string> notes{};   ///< what was left out
   std::vector<GpsFix> gps{};          ///< for a picture: nothing is estimated from it
 
+  /// Ends after so many frames, if there are more.
+  void keep_first(std::size_t count) {
+    if (frames.size() <= count) return;
+    frames.resize(count);
+    std::erase_if(between, [&](const Between& pose) { return pose.frame + 1 >= count; });
+  }
+
   /// Forgets which landmarks were seen.
   void withhold_identities() {
     for (Frame& frame : frames)

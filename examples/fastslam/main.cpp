@@ -31,7 +31,7 @@ struct Options {
   std::string data = "loop", name, folder, identities = "known", proposal = "landmarks",
               association = "drawn";
   int robot = 1;
-  std::size_t frames = 500;
+  std::optional<std::size_t> frames;
   std::filesystem::path out = "fastslam_out";
   SlamOptions slam{.threads = std::max(1U, std::thread::hardware_concurrency())};
 };
@@ -46,6 +46,7 @@ std::filesystem::path data_folder(const Options& options, const char* name) {
 }
 
 LandmarkLog log_of(const Options& options) {
+  const std::size_t simulated_frames = options.frames.value_or(500);
   if (options.data == "mrclam") return read_mrclam(data_folder(options, "mrclam_7"), options.robot);
   if (options.data == "victoria_park") {
     const std::filesystem::path folder = data_folder(options, "victoria_park");
@@ -58,9 +59,9 @@ LandmarkLog log_of(const Options& options) {
     if (options.name.empty())
       cairn::raise("--data map: expected the name of a map as --name: example_webmap, say");
     const PointMap map = read_point_map(data_folder(options, "fastslam_maps") / (options.name + ".mat"));
-    return simulated(map, options.slam.seed, options.frames);
+    return simulated(map, options.slam.seed, simulated_frames);
   }
-  return simulated(loop_map(), options.slam.seed, options.frames);
+  return simulated(loop_map(), options.slam.seed, simulated_frames);
 }
 
 Results run_with_progress(const LandmarkLog& log, const SlamOptions& options) {
@@ -97,8 +98,9 @@ void add_options(CLI::App& app, Options& o) {
                  "of the map: example_webmap, example_loop1, example_loop2, example_loop902");
   app.add_option("--folder", o.folder, "where the data is; else below CAIRN_DATA");
   app.add_option("--robot", o.robot, "of mrclam")->check(example::whole_number(1, 5));
-  app.add_option("--frames", o.frames, "of a simulated drive, five a second")
-      ->check(example::whole_number(1, 1000000));
+  app.add_option("--frames", o.frames, "only so many; of a simulated drive, five a second, 500")
+      ->check(example::whole_number(1, 1000000))
+      ->default_str("all");
   app.add_option("--identities", o.identities, "known or withheld: is it said which landmark was seen?")
       ->check(CLI::IsMember({"known", "withheld"}));
   app.add_option("--association", o.association, "where withheld: likeliest, or drawn by each particle")
@@ -123,8 +125,6 @@ void expect_use_of_all(const CLI::App& app, const Options& o) {
   if (o.data != "map") expect_absent(app, {"--name"}, "for --data map");
   if (o.data == "loop") expect_absent(app, {"--folder"}, "for data that is read: map, mrclam, victoria_park");
   if (o.data != "mrclam") expect_absent(app, {"--robot"}, "for --data mrclam");
-  if (o.data != "loop" && o.data != "map")
-    expect_absent(app, {"--frames"}, "for simulated drives: --data loop and map");
   if (o.identities == "known") expect_absent(app, {"--association"}, "for --identities withheld");
   if (o.proposal == "motion" && o.slam.redraw_below > 0)
     expect_absent(app, {"--redraw"}, "for --proposal landmarks");
@@ -142,6 +142,7 @@ int main(int argc, char** argv) {
   return example::exit_code_of(name, [&]() -> int {
     expect_use_of_all(app, options);
     LandmarkLog log = log_of(options);
+    if (options.frames) log.keep_first(*options.frames);
     if (options.identities == "withheld") log.withhold_identities();
     options.slam.proposal = options.proposal == "motion" ? ProposalKind::motion : ProposalKind::landmarks;
     options.slam.landmarks.pick =

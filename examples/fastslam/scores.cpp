@@ -125,7 +125,8 @@ void measure_landmarks(Results& r, const LandmarkLog& log) {
 void measure_gps(Results& r, const LandmarkLog& log) {
   std::vector<Vector<2>> fixes, path;
   for (const GpsFix& fix : log.gps)
-    if (const StampedPose2* pose = last_until(r.mean, fix.time)) {
+    if (const StampedPose2* pose = last_until(r.mean, fix.time);
+        pose != nullptr && fix.time <= r.mean.back().time) {
       fixes.push_back(fix.place);
       path.push_back(pose->pose.translation());
     }

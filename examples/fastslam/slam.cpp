@@ -478,7 +478,9 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
                        redraws ? spread.pose(belief) : belief.pose(),
                        {}});
     if (const StampedPose2* truth = log.start ? last_until(log.truth, frame.time) : nullptr)
-      r.steps.back().nees = cairn::nees(r.steps.back().pose, log.start->inverse() * truth->pose);
+      if (const double nees = cairn::nees(r.steps.back().pose, log.start->inverse() * truth->pose);
+          std::isfinite(nees))  // one particle has no covariance
+        r.steps.back().nees = nees;
     if (odometry.size() % every == 0) r.snapshots.push_back(snapshot_of(belief, frame.time));
     if (on_frame) r.ended_early = on_frame();
     if (r.ended_early) break;

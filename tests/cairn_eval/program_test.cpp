@@ -274,6 +274,7 @@ TEST_CASE("cairn_eval: what does not belong together is exit code 2 and words th
   says("truth.kitti", "short.kitti", "",
        (folder / "short.kitti").string() + ": expected as many poses as " +
            (folder / "truth.kitti").string() + " has, as neither has times, found 10 and 200");
+  says("truth.tum", "truth.tum", "--times" + quoted(folder / "nowhere.txt"), "--times is for KITTI files");
   says("truth.tum", "bad.tum", "", "bad.tum:2: expected 8 numbers");
   says("truth.tum", "words.tum", "", "words.tum:1: expected");
   says("truth.tum", "seven.tum", "", "TUM (8 numbers between blanks)");

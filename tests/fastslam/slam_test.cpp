@@ -372,6 +372,25 @@ TEST_SUITE("fastslam/slam") {
     CHECK(r.mean.size() == 4);
   }
 
+  TEST_CASE("fastslam: a log that is cut short ends with its last frame, and one particle has no NEES") {
+    LandmarkLog log = simulated(loop_map(), 1, 40);
+    for (const std::size_t frame : {3U, 8U, 9U, 20U}) {
+      log.between.push_back({log.frames[frame].time + 0.1, frame, SE2(0.01, 0, 0)});
+      log.gps.push_back({log.frames[frame].time, Vector<2>(static_cast<double>(frame), 0)});
+    }
+    log.keep_first(100);
+    REQUIRE(log.frames.size() == 40);
+    REQUIRE(log.between.size() == 4);
+    log.keep_first(10);
+    REQUIRE(log.frames.size() == 10);
+    CHECK(log.between.size() == 2);
+    const Results r = run(log, {.particles = 1});
+    CHECK(r.mean.size() == 12);
+    CHECK_FALSE(r.median_nees.has_value());
+    CHECK_FALSE(r.gps_median.has_value());  // three fixes are no path; the fourth is of later
+    CHECK(run(log, {.particles = 5}).median_nees.has_value());
+  }
+
   TEST_CASE("fastslam: what a robot saw before its odometry begins or after it ends is left out, and said") {
     // At the very start the robot has not moved: there is nothing to draw.
     const cairn_test::Folder folder;
