@@ -479,7 +479,7 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
                        {}});
     if (const StampedPose2* truth = log.start ? last_until(log.truth, frame.time) : nullptr)
       if (const double nees = cairn::nees(r.steps.back().pose, log.start->inverse() * truth->pose);
-          std::isfinite(nees))  // one particle has no covariance
+          std::isfinite(nees))  // one particle that was drawn again has no covariance
         r.steps.back().nees = nees;
     if (odometry.size() % every == 0) r.snapshots.push_back(snapshot_of(belief, frame.time));
     if (on_frame) r.ended_early = on_frame();
