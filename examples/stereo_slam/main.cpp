@@ -169,7 +169,7 @@ void expect_use_of_all(const CLI::App& app, const Arguments& arguments) {
   if (arena && !arguments.dataset.folder.empty())
     cairn::raise("--dataset arena is rendered; expected no folder, found " +
                  arguments.dataset.folder.string());
-  if (!arena) example::expect_absent(app, {"--script", "--drift", "--no-cache"}, "for --dataset arena");
+  if (!arena) example::expect_absent(app, {"--script", "--drift"}, "for --dataset arena");
   if (arguments.features != "surf") example::expect_absent(app, {"--oriented"}, "for --features surf");
   if (!arguments.dump.empty())
     example::expect_absent(app,

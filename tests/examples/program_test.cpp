@@ -108,14 +108,15 @@ TEST_SUITE("program") {
     const std::string out = " --out \"" + (folder / "out").string() + "\"";
     const std::string drive = "--dataset kitti_raw /nowhere";
     for (const std::string& mistake :
-         {drive + " --script loop", drive + " --drift 1", drive + " --no-cache",
-          std::string("--dataset arena ."), std::string("--features orb --oriented")}) {
+         {drive + " --script loop", drive + " --drift 1", std::string("--dataset arena ."),
+          std::string("--features orb --oriented")}) {
       CAPTURE(mistake);
       const Outcome outcome = run(mistake + out);
       CAPTURE(outcome.words);
       CHECK(outcome.code == 2);
       CHECK((outcome.says(" is for ") || outcome.says("expected no folder")));
     }
+    CHECK(run(drive + " --no-cache" + out).says("/nowhere"));  // a recording has none: so it is anyway
     for (const char* option : {"--out x", "--store single", "--points 500", "--budget 5", "--oriented",
                                "--calibrate on", "--motion ekf", "--features sift", "--live 0", "--save x",
                                "--save-rig x", "--load x", "--load x --localise"}) {
