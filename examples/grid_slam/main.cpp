@@ -204,9 +204,7 @@ int main(int argc, char** argv) {
       cairn::raise("--proposal is for --map stop and --map ancestry");
     if (app.count("--frame") > 0 && (options.map != Maps::tiles || !options.load.empty()))
       cairn::raise("--frame is for a new map of --map tiles");
-    for (const std::string* read : {&options.log, &options.relations})
-      if (example::same_file(options.save, *read))
-        cairn::raise(*read + ": is read by this run; expected another name for --save");
+    example::expect_not_read(options.save, {options.log, options.relations});
     const Input input = input_of(options);
     std::optional<Mapper> mapper;
     Results results =

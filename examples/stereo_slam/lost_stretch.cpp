@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: MIT
 #include "lost_stretch.hpp"
 
-#include <cmath>
 #include <cstddef>
 #include <optional>
 
@@ -11,11 +10,8 @@
 namespace stereo_slam {
 namespace {
 
-/// Seconds from each frame to the next.
 double time_between(const FrameRecord& from, const FrameRecord& to) {
-  constexpr double usual = 0.1;
-  const double dt = to.time - from.time;
-  return dt > 0 && std::isfinite(dt) ? dt : usual;
+  return seconds_between(from.time, to.time);
 }
 
 cairn::Gaussian<cairn::SE3> pose_of(const FrameRecord& frame) {

@@ -34,7 +34,7 @@ namespace stereo_slam {
 /// `bridged`. After the last known frame the pose stays, and its covariance grows by how far the camera would
 /// have come with its last twist, whichever way it went, and by the acceleration: T = T_a,
 /// P = P_a + s^2 diag(|v|^2 I, |w|^2 I) + A s^3 / 3. Frames before the first known one stay as they are.
-/// Where times do not rise a frame is taken for a tenth of a second. O(frames).
+/// Times as by seconds_between(). O(frames).
 void lay_lost_frames(std::vector<FrameRecord>& frames, const SteadyTwist& process);
 
 }  // namespace stereo_slam

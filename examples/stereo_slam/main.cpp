@@ -176,8 +176,7 @@ void expect_use_of_all(const CLI::App& app, const Arguments& arguments) {
                            {"--out", "--store", "--points", "--budget", "--oriented", "--calibrate",
                             "--motion", "--features", "--live", "--save", "--save-rig", "--load"},
                            "for a run, and --dump makes none");
-  if (example::same_file(arguments.save_map, arguments.camera))
-    cairn::raise(arguments.save_map.string() + ": is what --camera reads; expected another name for --save");
+  example::expect_not_read(arguments.save_map, {arguments.camera});
 }
 
 /// What a run left, and with which exit code the program is to say so.

@@ -50,8 +50,7 @@ std::optional<std::string> mistaken_sides(const cairn::StereoRig& rig, const Ste
     return few + ", but " + std::to_string(exchanged) + " with left and right exchanged, and " +
            std::to_string(other_side) +
            " with the right camera on the other side: expected the left camera's images as the left ones, "
-           "and "
-           "a rig that says where the right camera stands as the left one sees it (to its right is +x)";
+           "and a rig that says where the right camera stands as the left one sees it (to its right is +x)";
   if (far_more(elsewhere))
     return few + " at distances of " + cairn::shortest(options.nearest) + " to " +
            cairn::shortest(options.farthest) + " m, but " + std::to_string(elsewhere) +

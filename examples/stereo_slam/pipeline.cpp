@@ -194,9 +194,7 @@ void Pipeline::work_on(const StereoFrame& frame, const FramePoints& points, Fram
           cairn::raise(frame.name + ": " + *why);
       find_local_landmarks(pairs);
     });
-    constexpr double usual = 0.1;  // [s], where the clock of a recording stands still
-    const double dt = time_ ? frame.time - *time_ : usual;
-    motion_.predict(dt > 0 && std::isfinite(dt) ? dt : usual);
+    motion_.predict(seconds_between(time_.value_or(frame.time), frame.time));
     time_ = frame.time;
     if (map_.empty())
       begin(frame, result);

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: MIT
 #include "pose_filter.hpp"
 
+#include <cmath>
+
 #include <cairn/core/check.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/filter/extended.hpp>
@@ -27,6 +29,12 @@ bool with_filter(Motion motion, double gate, const Step& step) {
 }
 
 }  // namespace
+
+double seconds_between(double from, double to) {
+  constexpr double usual = 0.1;
+  const double dt = to - from;
+  return dt > 0 && std::isfinite(dt) ? dt : usual;
+}
 
 Moving SteadyTwist::propagate(const State& x, const Control&, double dt) const {
   const cairn::Vector<6> u = x.part<1>();

@@ -25,6 +25,9 @@
 
 namespace stereo_slam {
 
+/// Seconds from one frame to the next; a tenth where the clock of a recording stands still or runs back.
+[[nodiscard]] double seconds_between(double from, double to);
+
 /// Which filter follows the motion.
 enum class Motion {
   off,       ///< the last step is repeated; a camera that is lost stays where it was seen last

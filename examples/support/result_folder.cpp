@@ -239,6 +239,14 @@ private:
   std::optional<cairn::detail::Descriptor> lock_;
 };
 
+/// Whether two names are of one file, or would be, were it made.
+bool same_file(const fs::path& one, const fs::path& other) {
+  if (one.empty() || other.empty()) return false;
+  std::error_code failure;
+  const fs::path a = fs::weakly_canonical(fs::absolute(one, failure), failure);
+  return !failure && a == fs::weakly_canonical(fs::absolute(other, failure), failure) && !failure;
+}
+
 }  // namespace
 
 ResultFolder::ResultFolder(fs::path folder, Names names)
@@ -290,11 +298,10 @@ void ResultFolder::replace(const std::function<void(const fs::path& staging)>& f
   deliver(folder / complete_inside, folder, names_);
 }
 
-bool same_file(const fs::path& one, const fs::path& other) {
-  if (one.empty() || other.empty()) return false;
-  std::error_code failure;
-  const fs::path a = fs::weakly_canonical(fs::absolute(one, failure), failure);
-  return !failure && a == fs::weakly_canonical(fs::absolute(other, failure), failure) && !failure;
+void expect_not_read(const fs::path& save, const std::vector<fs::path>& read) {
+  for (const fs::path& file : read)
+    if (same_file(save, file))
+      cairn::raise(file.string() + ": is read by this run; expected another name for --save");
 }
 
 }  // namespace example

@@ -43,7 +43,8 @@ private:
   std::vector<std::string> names_;
 };
 
-/// Whether two names are of one file, or would be, were it made.
-[[nodiscard]] bool same_file(const std::filesystem::path& one, const std::filesystem::path& other);
+/// Throws cairn::Error where the file that is to be written by --save is one of those that the run reads. Any
+/// of them may be empty.
+void expect_not_read(const std::filesystem::path& save, const std::vector<std::filesystem::path>& read);
 
 }  // namespace example

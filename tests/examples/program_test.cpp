@@ -75,6 +75,12 @@ void make_drive(const cairn_test::Folder& folder, int frames) {
   REQUIRE(outcome.code == 0);
 }
 
+/// To run over it, with results in the folder "out".
+std::string over_drive(const cairn_test::Folder& folder) {
+  return "--dataset kitti_odometry \"" + (folder / "drive").string() + "\" --out \"" +
+         (folder / "out").string() + "\"";
+}
+
 void tear(const fs::path& file) {
   const std::string bytes = cairn::read_file(file);
   cairn::write_file_atomically(file, bytes.substr(0, bytes.size() / 2));
@@ -134,8 +140,7 @@ TEST_SUITE("program") {
     const cairn_test::Folder folder;
     make_drive(folder, 6);
     const fs::path drive = folder / "drive";
-    const std::string arguments =
-        "--dataset kitti_odometry \"" + drive.string() + "\" --out \"" + (folder / "out").string() + "\"";
+    const std::string arguments = over_drive(folder);
     const auto shrink = [&](const char* name) {
       example::write_png(drive / "image_1" / name, cairn::Image(384, 288, 100));
     };
@@ -186,8 +191,7 @@ TEST_SUITE("program") {
     const cairn_test::Folder folder;
     make_drive(folder, 8);
     tear(folder / "drive" / "image_1" / "000005.png");
-    const std::string arguments = "--dataset kitti_odometry \"" + (folder / "drive").string() +
-                                  "\" --out \"" + (folder / "out").string() + "\"";
+    const std::string arguments = over_drive(folder);
     for (const std::string threads : {"1", "2", "3", "8"}) {
       const Outcome outcome = run(arguments + " --threads " + threads);
       CAPTURE(outcome.words);
@@ -337,8 +341,7 @@ TEST_SUITE("program") {
   TEST_CASE("stereo_slam: where the first image is torn there is nothing to write, and old results stay") {
     const cairn_test::Folder folder;
     make_drive(folder, 3);
-    const std::string arguments = "--dataset kitti_odometry \"" + (folder / "drive").string() +
-                                  "\" --out \"" + (folder / "out").string() + "\"";
+    const std::string arguments = over_drive(folder);
     REQUIRE(run(arguments).code == 0);
     tear(folder / "drive" / "image_0" / "000000.png");
     const Outcome outcome = run(arguments);
@@ -502,8 +505,7 @@ TEST_SUITE("program") {
     const cairn_test::Folder folder;
     make_drive(folder, 9);
     const fs::path images = folder / "drive";
-    const std::string arguments =
-        "--dataset kitti_odometry \"" + images.string() + "\" --out \"" + (folder / "out").string() + "\"";
+    const std::string arguments = over_drive(folder);
     const auto poses = [&] { return cairn::read_tum(folder / "out" / "trajectory.tum"); };
     REQUIRE(run(arguments).code == 0);
     const cairn::Trajectory seen = poses();
