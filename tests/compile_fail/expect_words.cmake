@@ -1,12 +1,19 @@
-# cmake -DCOMPILER=... -DSOURCE=... -DINCLUDES=a;b -DROOM=lines -P expect_words.cmake: what SOURCE breaks has to end its compilation,
-# with the words of its first line ("// words: one; another") within the first ROOM lines of the compiler's output. A file that begins
-# with "// compiles" has to compile.
-file(READ "${SOURCE}" first_line)
-string(REGEX REPLACE "\n.*" "" first_line "${first_line}")
-set(flags -std=c++20 -fsyntax-only)
+# cmake -DCOMPILER=... -DSOURCE=... -DINCLUDES=a;b -DEIGEN=header -DROOM=lines -P expect_words.cmake: what SOURCE breaks has to end its
+# compilation, with the words of its first line ("// words: one; another") within the first ROOM lines of the compiler's output. A file
+# that begins with "// compiles" has to compile. Without SOURCE: writes the header EIGEN, which includes Eigen, and parses it for the
+# others (their compiler takes EIGEN.gch in its place).
+set(flags -std=c++20)
 foreach(directory IN LISTS INCLUDES)
   list(APPEND flags -isystem "${directory}")
 endforeach()
+if(NOT SOURCE)
+  file(WRITE "${EIGEN}" "#include <Eigen/Core>\n")
+  execute_process(COMMAND "${COMPILER}" ${flags} -x c++-header "${EIGEN}" -o "${EIGEN}.gch" COMMAND_ERROR_IS_FATAL ANY)
+  return()
+endif()
+file(READ "${SOURCE}" first_line)
+string(REGEX REPLACE "\n.*" "" first_line "${first_line}")
+list(APPEND flags -fsyntax-only -include "${EIGEN}")
 execute_process(COMMAND "${COMPILER}" ${flags} "${SOURCE}" RESULT_VARIABLE failed ERROR_VARIABLE output OUTPUT_VARIABLE output)
 if(first_line MATCHES "^// compiles")
   if(failed)
