@@ -5,7 +5,9 @@
 /// A drive around the campus, rendered: what the cameras saw and what odometry said.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include <cairn/filter/gaussian.hpp>
@@ -44,7 +46,11 @@ struct Drive {
   std::vector<Frame> frames{};
 };
 
+/// Called as frames are drawn, in their order and by the caller's thread: how many there are, and of how
+/// many. The drive ends where it says false.
+using OnDrawn = std::function<bool(std::size_t frames, std::size_t of)>;
+
 /// The same for any number of threads. Throws cairn::Error where a number is out of its range.
-[[nodiscard]] Drive simulated_drive(const DriveOptions& options);
+[[nodiscard]] Drive simulated_drive(const DriveOptions& options, const OnDrawn& on_drawn = {});
 
 }  // namespace line_slam

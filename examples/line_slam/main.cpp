@@ -30,6 +30,19 @@ namespace {
 
 using namespace line_slam;
 
+/// Ends early where it is interrupted, as the run that follows then says.
+Drive drawn_with_progress(const DriveOptions& options, bool quiet) {
+  std::ostream nowhere(nullptr);
+  std::optional<example::Progress> progress;  // from the first on, for it knows how many there are
+  return simulated_drive(options, [&](std::size_t frames, std::size_t of) {
+    if (!progress)
+      progress.emplace(quiet || options.detector_kind != DetectorKind::lsd ? nowhere : std::clog, "pictures",
+                       of);
+    while (progress->done() < frames) progress->step();
+    return !example::Interruption::caught();
+  });
+}
+
 Results run_with_progress(const Drive& drive, const RunOptions& options, bool quiet) {
   std::ostream nowhere(nullptr);
   example::Progress progress(quiet ? nowhere : std::clog, "frames", drive.frames.size());
@@ -95,7 +108,7 @@ int main(int argc, char** argv) {
     const example::Interruption interruption;
     drive_options.seed = options.seed;
     drive_options.threads = options.threads;
-    const Drive drive = simulated_drive(drive_options);
+    const Drive drive = drawn_with_progress(drive_options, quiet);
     const Results results = run_with_progress(drive, options, quiet);
     if (results.ended_early) std::cerr << name << ": " << *results.ended_early << '\n';
     if (const auto no_report = write_outputs(results, drive, out)) std::cout << *no_report << '\n';

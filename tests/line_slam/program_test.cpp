@@ -118,8 +118,8 @@ TEST_SUITE("line_slam/program") {
 
   TEST_CASE("line_slam: segments found in the pictures make a map, or it is said that there is no detector") {
     const cairn_test::Folder folder;
-    const Outcome outcome = run("--detector lsd --particles 20 --metres 12 --seed 5 --quiet --out \"" +
-                                (folder / "out").string() + "\"");
+    const Outcome outcome =
+        run("--detector lsd --particles 20 --metres 12 --seed 5 --out \"" + (folder / "out").string() + "\"");
     CAPTURE(outcome.words);
     if (outcome.says("expected OpenCV")) {
       CHECK(outcome.code == 2);
@@ -131,6 +131,15 @@ TEST_SUITE("line_slam/program") {
     const auto summary = nlohmann::json::parse(cairn::read_file(folder / "out" / "summary.json"));
     CHECK(summary["slam"]["lines"].get<int>() >= 20);
     CHECK(summary["slam"]["rms_m"].get<double>() < 0.3);
+    CHECK(outcome.says("pictures 100 %"));
+
+    // It is not deaf while it draws: of forty pictures most are left when it has said the first line.
+    CHECK(cairn_test::interrupt_program(
+              {program, "--detector", "lsd", "--metres", "30", "--out", (folder / "interrupted").string()},
+              {SIGTERM}, 1) == 4);
+    CHECK(names_in(folder / "interrupted") == results);
+    const auto ended = nlohmann::json::parse(cairn::read_file(folder / "interrupted" / "summary.json"));
+    CHECK(ended["frames"] == 1);
   }
 
   TEST_CASE("line_slam: interrupted, it writes the frames until then") {
