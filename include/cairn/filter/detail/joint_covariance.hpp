@@ -327,8 +327,7 @@ public:
     for (int q = 0; q < d; ++q)
       for (int p = 0; p < d; ++p) corner[q * d + p] = named(stabilised_, p, q);
     mirror_mean(corner, d);
-    // A singular P_nn may be negative by the rounding of what it was, which is more than that of what is
-    // left.
+    // What rounding made negative in a singular P_nn may be more than that of a result far below it.
     const bool good =
         semi_definite(corner, d) || (squares_by_root(a, gain, r, corner) && semi_definite(corner, d));
     put_corner(stabilised_, corner);
