@@ -99,7 +99,6 @@ std::vector<double> numbers(const Slam& belief) {
 struct LinearTriple {
   using State = Product<Vector<2>, Vector<3>, Vector<1>>;
   using Measurement = Vector<2>;
-  static constexpr bool linear = true;
   Matrix<2, 6> design;
   Matrix<2> covariance;
   [[nodiscard]] Vector<6> stacked(const State& x) const {
