@@ -99,7 +99,6 @@ std::vector<double> numbers(const Slam& belief) {
 struct LinearTriple {
   using State = Product<Vector<2>, Vector<3>, Vector<1>>;
   using Measurement = Vector<2>;
-  static constexpr bool linear = true;
   Matrix<2, 6> design;
   Matrix<2> covariance;
   [[nodiscard]] Vector<6> stacked(const State& x) const {
@@ -942,6 +941,56 @@ TEST_SUITE("joint_gaussian") {
     }
     CHECK(accepted > 1000);
     CHECK(refused > 100);
+  }
+
+  TEST_CASE("joint_gaussian: a stack of blocks that all follow from one is taken in, with its rounding") {
+    struct Follow {  // without noise: the joint covariance is singular
+      using State = Vector<2>;
+      using Measurement = Vector<1>;
+      using New = Vector<2>;
+      Matrix<2> by;
+      [[nodiscard]] New initialise(const State& x, const Measurement&) const { return by * x; }
+      [[nodiscard]] Matrix<2> jacobian(const State&, const Measurement&) const { return by; }
+      [[nodiscard]] Matrix<2> noise(const State&, const Measurement&) const { return Matrix<2>::Zero(); }
+    };
+    const std::uint64_t seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    for (const Form form : {Form::standard, Form::joseph})
+      for (int trial = 0; trial < 200; ++trial) {
+        CAPTURE(trial);
+        const double r = std::pow(10.0, random.uniform(-8, -2));
+        Slam belief;
+        std::vector<BlockId<Vector<2>>> blocks{belief.add(Vector<2>(0, 0), Matrix<2>::Identity()).id};
+        std::vector<Matrix<2>> by{Matrix<2>::Identity()};
+        Matrix<2> information = Matrix<2>::Identity();
+        StackedMeasurement<> stack;
+        for (int i = 0; i < 6; ++i) {
+          if (i > 0) {
+            by.push_back(cairn_test::random_matrix<2, 2>(random));
+            blocks.push_back(belief.augment(Follow{by.back()}, Vector<1>(0.0), blocks[0]).id);
+          }
+          const cairn::LinearSensor<2, 2> sensor{cairn_test::random_matrix<2, 2>(random),
+                                                 r * Matrix<2>::Identity()};
+          const Matrix<2> h = sensor.design * by.back();
+          information += h.transpose() * h / r;
+          REQUIRE(stack.add(belief, sensor, Vector<2>(0.1, 0.2), blocks.back()) == Status::accepted);
+        }
+        REQUIRE(JointExtended{.form = form}.update(belief, stack).accepted());
+        const Matrix<2> left = cairn::Cholesky<2>(information).inverse();
+        Matrix<d> p = belief.covariance();
+        for (int i = 0; i < 12; ++i)
+          for (int j = 0; j < 12; ++j) {
+            const auto exact = [&](int k, int l) -> double {
+              return by[static_cast<std::size_t>(k / 2)].row(k % 2) *
+                     (left * by[static_cast<std::size_t>(l / 2)].row(l % 2).transpose());
+            };
+            CHECK(std::abs(p(i, j) - exact(i, j)) < 1e-6 * std::sqrt(exact(i, i) * exact(j, j)));
+          }
+        int order[12], rank = 0;
+        double diagonal[12];
+        CHECK(cairn::detail::pivoted_cholesky(p.data(), 12, order, diagonal, rank));
+      }
   }
 
   TEST_CASE("joint_gaussian: steps too long for a rotation are refused") {

@@ -77,9 +77,10 @@ inline constexpr S no_variance = S(64) * std::numeric_limits<S>::epsilon();
 /// Cholesky of a symmetric positive semi-definite n x n matrix (column-major, full, destroyed) along its
 /// largest pivots, in units of the diagonal: order[k] is the row of pivot k, and column order[k] of `a` then
 /// holds that column of the root, in the rows order[k..n). False where the matrix is no covariance to
-/// rounding. O(n^2 rank). (N. Higham, "Accuracy and Stability of Numerical Algorithms", 2002, 10.3.)
+/// `rounding`. O(n^2 rank). (N. Higham, "Accuracy and Stability of Numerical Algorithms", 2002, 10.3.)
 template <class S>
-[[nodiscard]] bool pivoted_cholesky(S* a, int n, int* order, S* diagonal, int& rank) {
+[[nodiscard]] bool pivoted_cholesky(S* a, int n, int* order, S* diagonal, int& rank,
+                                    S rounding = S(2) * no_variance<S>) {
   using std::sqrt;
   const auto at = [a, n](int i, int j) -> S& {
     return a[static_cast<std::size_t>(j) * static_cast<std::size_t>(n) + static_cast<std::size_t>(i)];
@@ -113,7 +114,7 @@ template <class S>
   for (int r = rank; r < n; ++r)
     for (int q = rank; q < n; ++q) {
       const int i = order[q], j = order[r];
-      const S left = at(i, j) / (S(2) * no_variance<S>);
+      const S left = at(i, j) / rounding;
       good = good && left * left <= diagonal[i] * diagonal[j];
     }
   return good;
@@ -326,8 +327,11 @@ public:
     for (int q = 0; q < d; ++q)
       for (int p = 0; p < d; ++p) corner[q * d + p] = named(stabilised_, p, q);
     mirror_mean(corner, d);
+    // What rounding made negative in a singular P_nn may be more than that of a result far below it.
+    const bool good =
+        semi_definite(corner, d) || (squares_by_root(a, gain, r, corner) && semi_definite(corner, d));
     put_corner(stabilised_, corner);
-    return semi_definite(corner, d);
+    return good;
   }
 
   /// P <- P - W W^T, but for the rows that are considered among one another; and the stabilised rows.
@@ -465,7 +469,7 @@ private:
   /// More than the small matrices of a step of m numbers take.
   [[nodiscard]] std::size_t scratch_for(int m) const {
     const std::size_t d = index(named_count()) + index(m);
-    return 6 * (d + 8) * (d + 8);
+    return 8 * (d + 8) * (d + 8);
   }
   [[nodiscard]] S* zeros(std::size_t numbers) {
     S* const piece = work_.take(numbers);
@@ -499,6 +503,30 @@ private:
         for (int a = 0; a < parts[i].rows; ++a)
           h(parts[i].first + a, where_[i] + k) += parts[i].jacobian[k * parts[i].leading + a];
     return h;
+  }
+  /// Joseph's form of the named rows among one another from a root of theirs, (A L) (A L)^T + K R K^T:
+  /// nothing negative is left of P_nn = L L^T. What there was may be as much as the least that keeps_digits()
+  /// wants left of a variance: rounding of updates before, of larger variances. False where it is more.
+  [[nodiscard]] bool squares_by_root(const View<S>& a, S* gain, const S* r, S* corner) {
+    const int d = named_count(), m = m_;
+    NamedRoot root;
+    if (!factor_named(root, digits_left<S>)) return false;
+    const View<S> al = small(d, d), kr = small(d, m);
+    for (int p = 0; p < d; ++p) {
+      for (int k = 0; k < root.rank; ++k)
+        for (int q = k; q < d; ++q) al(p, k) += a(p, root.pivot(q)) * root(root.pivot(q), k);
+      for (int i = 0; i < m; ++i)
+        for (int k = 0; k < m; ++k) kr(p, i) += named(gain, k, p) * r[i * m + k];
+    }
+    for (int q = 0; q < d; ++q)
+      for (int p = 0; p < d; ++p) {
+        S sum(0);
+        for (int k = 0; k < root.rank; ++k) sum += al(p, k) * al(q, k);
+        for (int i = 0; i < m; ++i) sum += kr(p, i) * named(gain, i, q);
+        corner[q * d + p] = sum;
+      }
+    mirror_mean(corner, d);
+    return true;
   }
   /// H P = L W in the columns of the named rows.
   [[nodiscard]] View<S> predicted_of_named(const S* lower) {
@@ -539,7 +567,7 @@ private:
     [[nodiscard]] int pivot(int k) const { return pivots[index(k)]; }
     S operator()(int p, int k) const { return numbers[pivot(k) * d + p]; }
   };
-  [[nodiscard]] bool factor_named(NamedRoot& root) {
+  [[nodiscard]] bool factor_named(NamedRoot& root, S rounding = S(2) * no_variance<S>) {
     const int d = named_count();
     order_.resize(index(d));
     S* const numbers = work_.take(index(d) * index(d));
@@ -547,7 +575,7 @@ private:
     for (int q = 0; q < d; ++q)
       for (int p = 0; p < d; ++p) numbers[q * d + p] = named(gathered_, p, q);
     root = {numbers, diagonal, order_.data(), d, 0};
-    return pivoted_cholesky(numbers, d, order_.data(), diagonal, root.rank);
+    return pivoted_cholesky(numbers, d, order_.data(), diagonal, root.rank, rounding);
   }
   /// y of step = L y, and |y|^2. False where the step leaves the range of L.
   [[nodiscard]] bool whiten_step(const NamedRoot& root, const S* step, S* y, S& squared) {
