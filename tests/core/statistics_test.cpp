@@ -1,6 +1,8 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -62,10 +64,39 @@ TEST_SUITE("statistics") {
     CHECK(moments.variance() == doctest::Approx(squares / 999).epsilon(1e-6));
   }
 
+  // At its mean P(a, a) = 1/2 + (1/3 + 1/(540 a) - ...) / sqrt(2 pi a), and within a deviation of it a sum of
+  // so many squares is normal but for a skew of sqrt(8 / d): Cornish and Fisher's quantile.
+  TEST_CASE("gamma_p: from few degrees of freedom to 10^12 it is what its expansion says") {
+    for (double a = 100; a < 1e13; a *= 3) {
+      CAPTURE(a);
+      const double there = cairn::gamma_p(a, a);
+      const double off = (1.0 / 3 + 1.0 / 540 / a) / std::sqrt(2 * std::numbers::pi * a);
+      CHECK(std::abs(there - 0.5 - off) < 2e-3 / std::sqrt(a) / (a * a) + 1e-13);
+      const double low = cairn::gamma_p(a, a - std::sqrt(a)), high = cairn::gamma_p(a, a + std::sqrt(a));
+      CHECK(low > 0.15);
+      CHECK(low < there);
+      CHECK(high > there);
+      CHECK(high < 0.86);
+    }
+    for (const double dof : {1e6, 1e9, 1e12}) {
+      const auto band = cairn::chi_square_mean_band(1, dof);
+      constexpr double z = 1.959963984540054;
+      const double skew = 2 * (z * z - 1) / (3 * dof), spread = std::sqrt(2 / dof) * z;
+      CHECK(std::abs(band.low - (1 + skew - spread)) < 1e-3 * skew + 1e-15);
+      CHECK(std::abs(band.high - (1 + skew + spread)) < 1e-3 * skew + 1e-15);
+    }
+  }
+
   TEST_CASE("quantile: interpolates between order statistics") {
     CHECK(cairn::median({3.0, 1.0, 2.0}) == 2.0);
     CHECK(cairn::median({4.0, 1.0, 2.0, 3.0}) == 2.5);
     CHECK(cairn::quantile({0.0, 10.0}, 0.95) == doctest::Approx(9.5));
     CHECK(std::isnan(cairn::median({})));
+    constexpr double infinite = std::numeric_limits<double>::infinity();
+    CHECK(cairn::median({infinite, 2.0, 1.0}) == 2.0);
+    CHECK(cairn::median({infinite, 1.0, infinite, infinite}) == infinite);
+    CHECK(cairn::median({1.0, infinite}) == infinite);
+    CHECK(cairn::quantile({-infinite, 1.0}, 0.25) == -infinite);
+    CHECK(cairn::median({-1.5e308, 1.5e308}) == 0.0);
   }
 }

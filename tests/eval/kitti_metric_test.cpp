@@ -8,6 +8,7 @@
 
 #include <doctest/doctest.h>
 
+#include <cairn/core/check.hpp>
 #include <cairn/core/random.hpp>
 #include <cairn/eval/kitti_metric.hpp>
 #include <cairn/io/trajectory.hpp>
@@ -105,6 +106,23 @@ TEST_SUITE("kitti_metric") {
   TEST_CASE("kitti_metric: a path shorter than every length has no figure") {
     CHECK_FALSE(cairn::kitti_error(drive(100, 0.01, 0.0)).has_value());
     CHECK_FALSE(cairn::kitti_error({}).has_value());
+  }
+
+  TEST_CASE("kitti_metric: poses that are not finite are refused by name, in pairs and in rows") {
+    auto pairs = drive(1000, 0.01, 0.0);
+    std::vector<cairn::KittiRow> truth(pairs.size()), estimate(pairs.size());
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      truth[i] = pairs[i].truth.matrix().topRows<3>();
+      estimate[i] = pairs[i].estimate.matrix().topRows<3>();
+    }
+    REQUIRE(cairn::kitti_error(truth, estimate).has_value());
+    estimate[20](1, 3) = std::nan("");
+    pairs[20].estimate = cairn::SE3(cairn::SO3(), Vector<3>(0, std::nan(""), 0));
+    CHECK_THROWS_WITH_AS((void)cairn::kitti_error(pairs), doctest::Contains("pair 20"), cairn::Error);
+    CHECK_THROWS_WITH_AS((void)cairn::kitti_error(truth, estimate), doctest::Contains("row 20"),
+                         cairn::Error);
+    truth[7](0, 3) = INFINITY;
+    CHECK_THROWS_WITH_AS((void)cairn::kitti_error(truth, estimate), doctest::Contains("row 7"), cairn::Error);
   }
 
   TEST_CASE("kitti_metric: the published figures of KITTI 00, and the definition by plain loops") {

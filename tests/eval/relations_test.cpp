@@ -8,6 +8,7 @@
 
 #include <doctest/doctest.h>
 
+#include <cairn/core/check.hpp>
 #include <cairn/core/random.hpp>
 #include <cairn/eval/relations.hpp>
 #include <cairn/io/carmen.hpp>
@@ -76,6 +77,15 @@ TEST_SUITE("eval/relations") {
     CHECK(error.largest == 0);
     relations.push_back({std::nan(""), 1, SE2()});
     CHECK(relation_error(path, relations).missing == 1);
+  }
+
+  TEST_CASE("relations: poses that are not finite are refused by the relation that finds them") {
+    const std::vector<PoseRelation> relations{{0, 1, SE2(1, 0, 0)}, {1, 2, SE2(1, 0, 0)}};
+    std::vector<StampedPose2> path{{0, SE2()}, {1, SE2(1, 0, 0)}, {2, SE2(std::nan(""), 0, 0)}};
+    CHECK_THROWS_WITH_AS((void)relation_error(path, relations), doctest::Contains("relation 1"),
+                         cairn::Error);
+    path[2].time = 3;  // of no relation
+    CHECK(relation_error(path, relations).mean == 0);
   }
 
   TEST_CASE("relations: bad files are refused with the line") {

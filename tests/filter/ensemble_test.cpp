@@ -216,6 +216,8 @@ TEST_SUITE("particle") {
     CHECK(cairn::resample_by_kld(one, {.epsilon = 0.0}, bin, random) == Status::bad_option);
     CHECK(cairn::resample_by_kld(one, {.z = std::nan("")}, bin, random) == Status::bad_option);
     CHECK(cairn::resample_by_kld(one, {.least = 5, .most = 4}, bin, random) == Status::bad_option);
+    CHECK(cairn::resample_by_kld(one, {.least = 0}, bin, random) ==
+          Status::bad_option);  // none would be left
     CHECK(one.size() == 1);
   }
 }

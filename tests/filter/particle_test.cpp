@@ -7,6 +7,7 @@
 
 #include <doctest/doctest.h>
 
+#include <cairn/core/check.hpp>
 #include <cairn/core/random.hpp>
 #include <cairn/filter/particle.hpp>
 
@@ -54,6 +55,19 @@ TEST_SUITE("particle") {
     CHECK(found.covariance(1, 1) == doctest::Approx(1.9 - 0.09).epsilon(1e-14));
     CHECK(found.covariance(0, 1) == doctest::Approx(1.9 - 0.51).epsilon(1e-14));
     CHECK(found.covariance(1, 0) == doctest::Approx(1.39).epsilon(1e-14));
+  }
+
+  TEST_CASE(
+      "particle: moments are those of the weights' shares, whatever their sum, and of none there are none") {
+    Particles<Vector<2>> particles = three();
+    for (double& weight : particles.log_weights) weight += 2;
+    const auto found = cairn::moments(particles), expected = cairn::moments(three());
+    CHECK((found.mean - expected.mean).norm() < 1e-14);
+    CHECK((found.covariance - expected.covariance).norm() < 1e-14);
+    particles.log_weights[1] = std::nan("");
+    CHECK_THROWS_WITH_AS((void)cairn::moments(particles), doctest::Contains("index 1"), cairn::Error);
+    for (double& weight : particles.log_weights) weight = -1000;
+    CHECK_THROWS_AS((void)cairn::moments(particles), cairn::Error);
   }
 
   TEST_CASE(

@@ -66,6 +66,29 @@ TEST_SUITE("batch") {
     CHECK(count < 53);
   }
 
+  TEST_CASE(
+      "batch: a lane whose noise is no covariance stays as it was, also where S and its variances are "
+      "sound") {
+    const Gaussian<Vector<3>> prior{Vector<3>(1, 2, 3), 10 * Matrix<3>::Identity()};
+    Matrix<3> indefinite = Matrix<3>::Identity();
+    indefinite(0, 2) = indefinite(2, 0) = 2;  // its variances of -1 and 3 leave -1.1 and 2.3
+    Matrix<3> infinite = Matrix<3>::Identity();
+    infinite(1, 1) = INFINITY;
+    cairn::GaussianBatch<3> batch(20, prior);
+    cairn::GaussianBatch<3> seen(20, {Vector<3>(2, 2, 2), Matrix<3>::Identity()});
+    seen.set(4, {Vector<3>(2, 2, 2), indefinite});
+    seen.set(11, {Vector<3>(2, 2, 2), infinite});
+    std::vector<std::uint8_t> kept(20);
+    CHECK(cairn::BatchKalman{}.update(batch, seen, kept) == 18);
+    for (std::size_t i = 0; i < 20; ++i) {
+      CHECK((kept[i] == 0) == (i == 4 || i == 11));
+      CHECK((batch.get(i).covariance == prior.covariance) == (kept[i] == 0));
+    }
+    cairn::GaussianBatch<1> of_one(9, {Vector<1>(1), Matrix<1>(4)});
+    cairn::GaussianBatch<1> unknown(9, {Vector<1>(1), Matrix<1>(INFINITY)});
+    CHECK(cairn::BatchKalman{}.update(of_one, unknown) == 0);
+  }
+
   TEST_CASE("batch: a lane with bad numbers stays as it was and disturbs no other") {
     const Gaussian<Vector<3>> prior{Vector<3>(1, 2, 3), Matrix<3>::Identity()};
     cairn::GaussianBatch<3> batch(20, prior);

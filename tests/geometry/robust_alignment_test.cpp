@@ -170,6 +170,34 @@ TEST_SUITE("robust_alignment") {
     CHECK(moved.inliers == near.inliers);
   }
 
+  // The sources' distance is a lever: that of the pose's covariance, which is right where the points are.
+  TEST_CASE(
+      "align_robustly: sources ten million metres from the origin cost no accuracy, and one pair anywhere") {
+    cairn::Random random(cairn_test::seed());
+    for (const double scale : {1e5, 1e6, 1e7}) {
+      CAPTURE(scale);
+      const Vector<3> far = scale * Vector<3>(0.4, -0.8, 0.3);
+      const SE3 T = cairn_test::random_pose(random), to_far(cairn::SO3(), far);
+      auto data = pairs(T, 30, random);
+      data[0].source = Vector<3>(1e12, 0, 0);
+      const RobustAlignment near = align_robustly(data);
+      for (PointMatch& pair : data) pair.source += far;
+      const RobustAlignment moved = align_robustly(data);
+      REQUIRE(near.good());
+      REQUIRE(moved.good());
+      const SE3 back = moved.T_target_source * to_far;
+      const double rounding = 1e-15 * scale;  // of the coordinates, and of the motion's matrix at them
+      CHECK((back.translation() - near.T_target_source.translation()).norm() < 20 * rounding);
+      CHECK(cairn::local(back.rotation(), near.T_target_source.rotation()).norm() < 20 * rounding);
+      CHECK(moved.inliers == near.inliers);
+      const Matrix<6> at_points =
+          to_far.inverse().adjoint() * moved.covariance * to_far.inverse().adjoint().transpose();
+      CHECK((at_points - near.covariance).norm() < 1e-16 * scale * scale * near.covariance.norm());
+      CHECK(cairn::Cholesky<6>(moved.covariance).good());
+      CHECK(cairn::Cholesky<6>(moved.information).good());
+    }
+  }
+
   TEST_CASE("align_robustly: names the pair that is not finite, or whose covariance is none") {
     cairn::Random random(cairn_test::seed());
     const auto good = pairs(SE3(), 0, random);

@@ -80,6 +80,22 @@ TEST_SUITE("packed_points") {
         }
   }
 
+  TEST_CASE(
+      "packed_points: distances whose squares are below the least normal number are those of brute force") {
+    cairn::Random random(cairn_test::seed(57));
+    for (int round = 0; round < 60; ++round) {
+      constexpr std::size_t dim = 40;
+      std::vector<float> points, queries;
+      for (std::size_t i = 0; i < 60 * dim; ++i)
+        points.push_back(static_cast<float>(1e-22 * random.normal()));
+      for (std::size_t i = 0; i < 30 * dim; ++i)
+        queries.push_back(static_cast<float>(1e-22 * random.normal()));
+      const cairn::PackedPoints packed{Rows<float>(points, dim)};
+      CHECK(differing(cairn::nearest_two(packed, Rows<float>(queries, dim)),
+                      by_definition(points, queries, dim)) == 0);
+    }
+  }
+
   TEST_CASE("packed_points: panels, tiles, threads and vector widths change nothing") {
     cairn::Random random(cairn_test::seed(52));
     const auto points = cairn_test::make_points<float>("uniform", 3000, 64, random);

@@ -271,7 +271,7 @@ TEST_SUITE("keyframe_map") {
       for (Eigen::Index i = 0; i < 12; ++i) root(i, j) = 0.1 * random.normal();
     const Matrix<dynamic> P = root * root.transpose() + 1e-4 * Matrix<dynamic>::Identity(12, 12);
     cairn::detail::KeyframeSolution solution;
-    REQUIRE(equations.solve(P, solution));
+    REQUIRE(equations.solve(P, Vector<3>::Zero(), solution));
     Matrix<dynamic> M = equations.information();
     M.topLeftCorner(12, 12) += cairn_test::inverse_of(P);
     const Matrix<dynamic> inverse = cairn_test::inverse_of(M);
@@ -354,6 +354,32 @@ TEST_SUITE("keyframe_map") {
     const auto with = map.seen_with(of_first);
     CHECK(with.size() == 39);
     CHECK(std::ranges::find(with, 39U) == with.end());
+  }
+
+  TEST_CASE("keyframe_map: a world whose origin is far away locates and learns as one that begins here") {
+    const Scene s = scene(cairn_test::seed(), 4, 60);
+    for (const double scale : {1e5, 1e6}) {
+      CAPTURE(scale);
+      KeyframeMap near(cairn_test::arena_rig()), moved(cairn_test::arena_rig());
+      const SE3 far(cairn::SO3::exp(Vector<3>(0.3, -0.2, 1)), scale * Vector<3>(0.9, -0.4, 0.1));
+      near.begin(s.poses[0]);
+      moved.begin(far * s.poses[0]);
+      for (const StereoSighting& one : s.seen[0]) {
+        REQUIRE(near.add_landmark(one));
+        REQUIRE(moved.add_landmark(one));
+      }
+      for (std::size_t k = 1; k < s.poses.size(); ++k) {
+        const auto here = near.locate(s.poses[k], s.seen[k]),
+                   there = moved.locate(far * s.poses[k], s.seen[k]);
+        REQUIRE(here.good());
+        REQUIRE(there.good());
+        CHECK(cairn::local(far * here.T_world_camera, there.T_world_camera).norm() < 1e-3);  // of 0.01
+        CHECK(there.inlier_count + 3 >= here.inlier_count);
+        CHECK(near.add_keyframe(here, s.seen[k]));
+        CHECK(moved.add_keyframe(there, s.seen[k]));
+      }
+      CHECK(moved.keyframe_count() == 4);
+    }
   }
 
   TEST_CASE("keyframe_map: sigmas whose squares are no numbers are refused") {

@@ -9,11 +9,13 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/linalg.hpp>
 #include <cairn/io/trajectory.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>
@@ -26,6 +28,16 @@ struct PosePair {
   SE3 truth;        ///< T_world_body
   SE3 estimate;     ///< T_world'_body
 };
+
+namespace detail {
+
+inline void expect_finite(std::span<const PosePair> pairs, const char* who) {
+  for (std::size_t i = 0; i < pairs.size(); ++i)
+    if (!all_finite(pairs[i].truth.matrix()) || !all_finite(pairs[i].estimate.matrix()))
+      raise(std::string(who) + ": expected finite poses, pair " + std::to_string(i) + " has others");
+}
+
+}  // namespace detail
 
 struct AssociationOptions {
   double largest_difference = 0.01;  ///< [s]; pairs farther apart are left out

@@ -18,6 +18,7 @@
 #include <numbers>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -111,9 +112,10 @@ inline KittiRow relative(const KittiRow& a, const KittiRow& b) {
 
 /// The KITTI measure of pairs in the order of time, or nothing when the path is shorter than every length.
 /// Frames that were not tracked must stand in the pairs with their last pose, as the benchmark demands.
-/// O(n log n).
+/// Throws Error naming a pair with a pose that is not finite. O(n log n).
 [[nodiscard]] inline std::optional<KittiError> kitti_error(std::span<const PosePair> pairs,
                                                            const KittiOptions& options = {}) {
+  detail::expect_finite(pairs, "kitti_error");
   return detail::kitti_error_over(path_distances(pairs), options, [&](std::size_t i, std::size_t j) {
     const SE3 E = (pairs[i].estimate.inverse() * pairs[j].estimate).inverse() *
                   (pairs[i].truth.inverse() * pairs[j].truth);  // (1)
@@ -124,11 +126,14 @@ inline KittiRow relative(const KittiRow& a, const KittiRow& b) {
 /// The same computed from the printed matrices as they stand, inverses by transposing and angles by trace, as
 /// published figures are: rows printed with seven digits are no rotations, and the trace sees that. On KITTI
 /// 00 ORB-SLAM2 has 0.2536 deg per 100 m this way and 0.2533 by the other function. Needs as many true rows
-/// as estimated ones.
+/// as estimated ones. Throws Error naming a row with a number that is not finite.
 [[nodiscard]] inline std::optional<KittiError> kitti_error(std::span<const KittiRow> truth,
                                                            std::span<const KittiRow> estimate,
                                                            const KittiOptions& options = {}) {
   CAIRN_EXPECTS(truth.size() == estimate.size(), "kitti_error needs one estimate for each true pose");
+  for (std::size_t i = 0; i < truth.size(); ++i)
+    if (!all_finite(truth[i]) || !all_finite(estimate[i]))
+      raise("kitti_error: expected finite numbers, row " + std::to_string(i) + " has others");
   std::vector<double> distances(truth.size(), 0.0);
   for (std::size_t i = 1; i < truth.size(); ++i)
     distances[i] = distances[i - 1] + (detail::position(truth[i]) - detail::position(truth[i - 1])).norm();

@@ -20,6 +20,7 @@
 #include <utility>
 #include <vector>
 
+#include <cairn/core/check.hpp>
 #include <cairn/io/text.hpp>
 #include <cairn/manifold/se2.hpp>
 #include <cairn/version.hpp>
@@ -107,7 +108,8 @@ private:
 }  // namespace detail
 
 /// The error of a path, whose times need not rise. A relation finds its poses by time within `tolerance` [s],
-/// half of the last digit that the files print.
+/// half of the last digit that the files print. Throws Error naming a relation that is not finite, or whose
+/// poses are not.
 [[nodiscard]] inline RelationError relation_error(std::span<const StampedPose2> path,
                                                   std::span<const PoseRelation> relations,
                                                   double tolerance = 5e-6) {
@@ -124,6 +126,9 @@ private:
     const SE2 off = relation.T_first_second.inverse() * (first->inverse() * *second);
     error.lengths.push_back(off.translation().norm());
     angles.push_back(std::abs(off.angle()));
+    if (!std::isfinite(error.lengths.back()) || !std::isfinite(angles.back()))
+      raise("relation_error: expected finite poses, relation " +
+            std::to_string(&relation - relations.data()) + " or those at its times have others");
   }
   error.count = error.lengths.size();
   if (error.count == 0) return error;

@@ -82,12 +82,6 @@ struct AbsoluteError {
 
 namespace detail {
 
-inline void expect_finite(std::span<const PosePair> pairs, const char* who) {
-  for (std::size_t i = 0; i < pairs.size(); ++i)
-    if (!all_finite(pairs[i].truth.matrix()) || !all_finite(pairs[i].estimate.matrix()))
-      raise(std::string(who) + ": expected finite poses, pair " + std::to_string(i) + " has others");
-}
-
 /// T_align and scale of (1); nothing where the positions do not determine them.
 inline std::optional<Alignment> alignment_of(std::span<const PosePair> pairs, AlignBy by) {
   Alignment given;

@@ -122,12 +122,14 @@ struct BatchKalman {
 
   /// x <- F x, P <- F P F^T + Q for every belief, the same F and Q (anything that stands for a matrix).
   /// Refused, and nothing changed: another run-time size, a Q that is no covariance, an F that is not finite.
+  /// A lane that leaves what numbers hold takes in nothing from then on; drift() too may carry one there.
   template <int N, class S, MatrixOf<N, N, S> F, MatrixOf<N, N, S> Q>
   Status predict(GaussianBatch<N, S>& batch, const F& f, const Q& noise) const;
 
   /// Belief i takes in measurement i = N(z_i, R_i) of all its states (H = I). Returns how many were kept;
   /// `kept`, where given, gets a 1 or 0 for each. Throws Error where the sizes differ. A lane whose numbers
-  /// are not finite, whose S is not positive definite or whose NIS is above the gate stays as it was.
+  /// are not finite, whose S or what would be left of P is not positive definite, as where R_i is no
+  /// covariance, or whose NIS is above the gate stays as it was.
   template <int N, class S>
   std::size_t update(GaussianBatch<N, S>& batch, const GaussianBatch<N, S>& seen,
                      std::span<std::uint8_t> kept = {}) const;
@@ -191,12 +193,20 @@ template <int N, class S>
       next.mean[i] += scaled * y[m];
       for (int j = 0; j <= i; ++j) next.covariance[Batch::place(i, j)] -= scaled * w[m][j];
     }
-  Lane in_p = next.covariance[0] - belief.covariance[0] * least;  // and of a variance
-  Lane none = next.mean[0] * S(0);                                // NaN beside a mean that is not finite
-  for (int i = 1; i < N; ++i) {
-    const int place = Batch::place(i, i);
-    in_p = lesser(in_p, next.covariance[place] - belief.covariance[place] * least);
-    none += next.mean[i] * S(0);
+  // And of what is left of P. That has as many negative pivots as R: with both S and P positive, one says
+  // that R is no covariance.
+  Lane in_p = next.covariance[0] - belief.covariance[0] * least;
+  Lane none = (next.mean[0] + seen.covariance[0]) * S(0);  // NaN beside a mean or an R that is not finite
+  for (int i = 0; i < N; ++i)
+    for (int j = 0; j <= i; ++j) lower[i][j] = next.covariance[Batch::place(i, j)];
+  for (int m = 0; m + 1 < N; ++m) {
+    const Lane inverse = S(1) / lower[m][m];
+    for (int i = m + 1; i < N; ++i) {
+      const Lane factor = lower[i][m] * inverse;
+      for (int k = m + 1; k <= i; ++k) lower[i][k] -= factor * lower[k][m];
+    }
+    in_p = lesser(in_p, lower[m + 1][m + 1] - belief.covariance[Batch::place(m + 1, m + 1)] * least);
+    none += (next.mean[m + 1] + seen.covariance[Batch::place(m + 1, m + 1)]) * S(0);
   }
   const auto sound = in_s > S(0);
   const auto kept = in_p > S(0);

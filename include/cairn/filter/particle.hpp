@@ -64,14 +64,14 @@ inline std::vector<double> shares_of(std::span<const double> weights) {
   double sum = 0.0;
   for (std::size_t i = 0; i < shares.size(); ++i) {
     if (!(shares[i] >= 0.0) || !(shares[i] <= std::numeric_limits<double>::max())) {
-      std::string text("resampling: expected weights that are finite and not negative; found ");
+      std::string text("particles: expected weights that are finite and not negative; found ");
       text.append(std::to_string(shares[i])).append(" at index ").append(std::to_string(i));
       raise(text);
     }
     sum += shares[i];
   }
   if (!(sum > 0.0) || !(sum <= std::numeric_limits<double>::max()))
-    raise("resampling: expected weights with a finite sum above zero");
+    raise("particles: expected weights with a finite sum above zero");
   if (sum != 1.0)
     for (double& share : shares) share /= sum;
   return shares;
@@ -164,7 +164,7 @@ struct Particles {
     for (std::size_t i = 0; i < w.size(); ++i) w[i] = std::exp(log_weights[i]);
     return w;
   }
-  /// 1 / sum w^2: between 1 and size().
+  /// 1 / sum w^2: between 1 and size() where the weights sum to 1.
   [[nodiscard]] double effective_size() const {
     double sum = 0.0;
     for (const double w : weights()) sum += w * w;
@@ -200,9 +200,9 @@ struct Particles {
 
 /// How close KLD sampling comes to the distribution, and its bounds.
 struct KldSampling {
-  double epsilon = 0.05;   ///< Kullback-Leibler distance; > 0
-  double z = 2.326347874;  ///< normal quantile of the confidence, here 99 %
-  std::size_t least = 100;
+  double epsilon = 0.05;    ///< Kullback-Leibler distance; > 0
+  double z = 2.326347874;   ///< normal quantile of the confidence, here 99 %
+  std::size_t least = 100;  ///< > 0; of very few one bin may hold all, and then no more are asked for
   std::size_t most = 100000;
 };
 
@@ -214,7 +214,7 @@ template <class X, class Bin>
 Status resample_by_kld(Particles<X>& belief, const KldSampling& options, const Bin& bin, Random& random) {
   if (belief.states.empty()) return Status::depleted;
   if (belief.log_weights.size() != belief.size()) return Status::size_mismatch;
-  if (!(options.epsilon > 0.0) || !std::isfinite(options.z) || options.most < 1 ||
+  if (!(options.epsilon > 0.0) || !std::isfinite(options.z) || options.least < 1 ||
       options.least > options.most)
     return Status::bad_option;
   std::vector<double> sums = belief.weights();
@@ -246,14 +246,15 @@ template <Manifold X>
 }
 
 /// Weighted mean (tangent averaging from the heaviest particle, two rounds) and covariance of at least one
-/// particle.
+/// particle, for weights of any sum above zero. Throws Error naming a weight that is not finite, or where all
+/// are zero.
 template <Manifold X>
 [[nodiscard]] Gaussian<X> moments(const Particles<X>& particles) {
   using S = ScalarOf<X>;
   CAIRN_EXPECTS(!particles.states.empty(), "moments needs at least one particle");
   CAIRN_EXPECTS(particles.log_weights.size() == particles.size() && detail::common_size(particles.states) > 0,
                 "moments needs particles of one size with one weight each");
-  const std::vector<double> w = particles.weights();
+  const std::vector<double> w = detail::shares_of(particles.weights());
   X mean = particles.states[static_cast<std::size_t>(std::max_element(w.begin(), w.end()) - w.begin())];
   for (int round = 0; round < 2; ++round) {
     Tangent<X> shift = Tangent<X>::Zero(dof_of(mean));

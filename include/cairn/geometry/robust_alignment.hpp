@@ -23,6 +23,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include <cairn/core/check.hpp>
@@ -97,6 +98,11 @@ public:
       if (!nearly_semi_definite(pair.source_covariance) || !nearly_semi_definite(pair.target_covariance))
         refuse_pair(i, "covariances: finite, symmetric, positive semi-definite");
     }
+    for (int axis = 0; axis < 3 && !pairs.empty(); ++axis) {  // of most: one wrong pair may be anywhere
+      std::vector<double> places;
+      for (const PointMatch& pair : pairs) places.push_back(pair.source(axis));
+      centre_(axis) = median(std::move(places));
+    }
   }
 
   [[nodiscard]] std::size_t size() const noexcept { return pairs_.size(); }
@@ -135,7 +141,11 @@ public:
 
   /// One reweighted Gauss-Newton step: its length in standard deviations, squared.
   [[nodiscard]] std::optional<double> step(SE3& motion, double gate) const {
-    return newton_step(linearise(motion, gate, options_.loss), motion);
+    const SE3 to_centre(SO3(), centre_);
+    SE3 there = motion * to_centre;
+    const auto length = newton_step(linearise(motion, gate, options_.loss), there);
+    if (length) motion = there * to_centre.inverse();
+    return length;
   }
   [[nodiscard]] std::optional<double> step(SE3& motion) const { return step(motion, gate_); }
 
@@ -152,7 +162,13 @@ public:
     const Matrix<6> seen = efficiency * (information - noise);
     const auto factor = factor_information(seen);
     if (!factor) return std::nullopt;
-    return Certainty{seen, factor->inverse()};
+    const Matrix<6> to_origin = SE3(SO3(), centre_).adjoint(), to_centre = SE3(SO3(), -centre_).adjoint();
+    const Certainty result{symmetrised(Matrix<6>(to_centre.transpose() * seen * to_centre)),
+                           symmetrised(Matrix<6>(to_origin * factor->inverse() * to_origin.transpose()))};
+    // So far away that these matrices hold nothing of what is known at the points.
+    if (!Cholesky<6>(result.information).good() || !Cholesky<6>(result.covariance).good())
+      return std::nullopt;
+    return result;
   }
 
 private:
@@ -183,8 +199,9 @@ private:
     }
   };
 
-  /// By (1), of the pairs below the gate; what the noise of the levers adds to the rotation goes to
-  /// `of_levers`.
+  /// By (1), of the pairs below the gate, for right steps at the centre of the sources: from an origin far
+  /// away all levers are alike, and their differences, which the rotation is known by, rounding. What the
+  /// noise of the levers adds to the rotation goes to `of_levers`.
   [[nodiscard]] NormalEquations linearise(const SE3& motion, double gate, RobustLoss loss,
                                           Matrix<3>* of_levers = nullptr) const {
     const Frame frame(motion);
@@ -198,7 +215,7 @@ private:
       const Matrix<3> weight = robust_weight(loss, options_.loss_scale, chi_squared) * inverse;
       const Matrix<3> share = product(inverse, residual.of_target);  // C^-1 R^T C_y R
       const Vector<3> point = residual.q - transposed_product(share, residual.r);
-      const Matrix<3> lever = skew(point), weight_lever = product(weight, lever);
+      const Matrix<3> lever = skew(Vector<3>(point - centre_)), weight_lever = product(weight, lever);
       const Vector<3> pull = product(weight, residual.r);
       translation += weight;
       coupling -= weight_lever;
@@ -224,6 +241,7 @@ private:
   std::span<const PointMatch> pairs_;
   RobustAlignmentOptions options_;
   double gate_;
+  Vector<3> centre_ = Vector<3>::Zero();  ///< of the sources, by medians
 };
 
 }  // namespace detail

@@ -221,9 +221,10 @@ template <PointSet Queries>
     BulkQuery& query = answers.queries[i];
     query.row = answers.rows.data() + i * dim;
     for (std::size_t a = 0; a < dim; ++a) query.square += query.row[a] * query.row[a];
-    // Each sum is off by at most dim + 1 roundings of its size, and |2 q.p| <= |q|^2 + |p|^2.
+    // Each sum is off by at most dim + 1 roundings of its size, and |2 q.p| <= |q|^2 + |p|^2; below the least
+    // normal number roundings are of a size of their own.
     query.margin = 4 * static_cast<float>(dim + 4) * std::numeric_limits<float>::epsilon() *
-                   (query.square + points.largest_square());
+                   (query.square + points.largest_square() + std::numeric_limits<float>::min());
   }
   return answers;
 }

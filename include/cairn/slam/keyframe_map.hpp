@@ -79,7 +79,9 @@ struct KeyframeMapOptions {
   /// By how much the rig may be off. Where it is not known exactly, its numbers are part of the joint state
   /// and are learned with the keyframes.
   RigSigmas rig;
-  double first_sigma = 1e-6;        ///< of the first keyframe, which is the gauge [m, rad]
+  /// Of the first keyframe, which is the gauge [m, rad], about the world's origin: a million metres from it
+  /// the default leaves a metre.
+  double first_sigma = 1e-6;
   double contradiction = 1 - 1e-6;  ///< a list less likely than this is that of no landmark; it is forgotten
   double much_vaguer =
       9;  ///< a keyframe learns from lists that may grow unless its variance is so much larger
@@ -353,7 +355,7 @@ public:
       judge(result.T_world_camera, work);
       if (linearise(work) < options_.min_matches)
         return refused(std::move(result), MapLocationStatus::too_few_matches);
-      if (!equations_.solve(work.prior, work.solution))
+      if (!equations_.solve(work.prior, result.T_world_camera.translation(), work.solution))
         return refused(std::move(result), MapLocationStatus::degenerate);
       const Vector<6> d = work.solution.step.tail<6>();
       result.T_world_camera = SE3::exp(d) * result.T_world_camera;
@@ -670,7 +672,9 @@ private:
     judge(here.T_world_camera, work);
     for (Entry& entry : work.entries)  // judged by all that located it
       if (std::isfinite(entry.chi_squared)) entry.chi_squared = here.chi_squared[entry.match] / pixel_factor_;
-    if (linearise(work) < options_.min_matches || !equations_.solve(work.prior, work.solution)) return false;
+    if (linearise(work) < options_.min_matches ||
+        !equations_.solve(work.prior, here.T_world_camera.translation(), work.solution))
+      return false;
     const Matrix<6> P = pose_factor_ * seen_from_body(work.solution.covariance.bottomRightCorner<6, 6>(),
                                                       here.T_world_camera);
     for (int i = 0; i < 6; ++i)

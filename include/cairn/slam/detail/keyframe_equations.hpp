@@ -23,6 +23,7 @@
 
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
+#include <cairn/manifold/se3.hpp>
 #include <cairn/slam/detail/keyframe_landmark.hpp>
 #include <cairn/slam/world_pose.hpp>
 #include <cairn/version.hpp>
@@ -98,9 +99,12 @@ public:
   /// The camera's part alone: what the matches would say if the keyframes were known.
   [[nodiscard]] const Matrix<6>& camera() const noexcept { return blocks_.back(); }
 
-  /// False where the matches leave a direction of the camera undetermined, or P is no covariance.
-  [[nodiscard]] bool solve(const Matrix<dynamic, dynamic>& P, KeyframeSolution& solution) const {
-    const Cholesky<6> alone(camera());
+  /// False where the matches leave a direction of the camera undetermined, or P is no covariance. Directions
+  /// are told apart about the place of the camera: from an origin far away all points are in one.
+  [[nodiscard]] bool solve(const Matrix<dynamic, dynamic>& P, const Vector<3>& place,
+                           KeyframeSolution& solution) const {
+    const Matrix<6> to_place = SE3(SO3(), place).adjoint();
+    const Cholesky<6> alone(symmetrised(Matrix<6>(to_place.transpose() * camera() * to_place)));
     if (!alone.good() || !(alone.least_share() > 1e-10)) return false;
     const Cholesky<dynamic> prior(P);
     if (!prior.good()) return false;
