@@ -30,7 +30,7 @@ using Factor = Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>>;
 /// Of a sighting from where it should be seen, and its noise.
 std::pair<Vector<2>, Matrix<2>> error_of(const PointSensor& sensor, const SE2& x, const Vector<2>& m,
                                          const Map::Sighting& sighting) {
-  return {-cairn::local(sensor.predict(x, m), sighting.z), sensor.noise(x, sensor.initialise(x, sighting.z))};
+  return {-cairn::local(sensor.predict(x, m), sighting.z), sensor.noise_at(sighting.z.part<0>()(0))};
 }
 
 /// Where a sighting is linearised: at the landmark, but no nearer than half of the distance that was

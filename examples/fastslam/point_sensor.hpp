@@ -36,10 +36,17 @@ struct PointSensor {
     return cairn::RangeBearing{.beacon = m}.jacobian(x);
   }
   [[nodiscard]] cairn::Matrix<2> part_jacobian(const State& x, const Part& m) const {
-    return -state_jacobian(x, m).leftCols<2>() * x.rotation().inverse().matrix();
+    const Part d = m - x.translation();  // a landmark that moves in the world does not ask for the heading
+    const double squared = d.squaredNorm(), range = std::sqrt(squared);
+    cairn::Matrix<2> h;
+    h << d(0) / range, d(1) / range, -d(1) / squared, d(0) / squared;
+    return h;
   }
   [[nodiscard]] cairn::Matrix<2> noise(const State& x, const Part& m) const {
-    const double across = across_sigma / std::max(0.1, (m - x.translation()).norm());
+    return noise_at((m - x.translation()).norm());
+  }
+  [[nodiscard]] cairn::Matrix<2> noise_at(double range) const {
+    const double across = across_sigma / std::max(0.1, range);
     return cairn::Vector<2>(range_sigma * range_sigma, bearing_sigma * bearing_sigma + across * across)
         .asDiagonal();
   }

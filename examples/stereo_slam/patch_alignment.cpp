@@ -9,8 +9,6 @@
 
 #include <cairn/core/linalg.hpp>
 
-#include "grey_level.hpp"
-
 namespace stereo_slam {
 namespace {
 
@@ -48,11 +46,28 @@ struct Template {
 /// Fills grey levels and slopes (central differences) of the patch around (x, y).
 void sample_template(cairn::ImageView image, float x, float y, Template& result) {
   constexpr int wide = patch_side + 2;
-  std::array<float, wide * wide> grey{};
-  for (int v = 0, i = 0; v < wide; ++v)
-    for (int u = 0; u < wide; ++u, ++i)
-      grey[static_cast<std::size_t>(i)] = grey_level(image, x + static_cast<float>(u - patch_half - 1),
-                                                     y + static_cast<float>(v - patch_half - 1));
+  // Between two columns of the image first, of every row once, then between two rows.
+  const float left = x - (patch_half + 1), top = y - (patch_half + 1);
+  const int first = static_cast<int>(left), line = static_cast<int>(top);
+  std::array<float, wide> part;
+  for (int u = 0; u < wide; ++u)
+    part[static_cast<std::size_t>(u)] =
+        (x + static_cast<float>(u - patch_half - 1)) - static_cast<float>(first + u);
+  std::array<std::array<float, wide>, wide + 1> across;
+  for (int v = 0; v <= wide; ++v) {
+    const std::uint8_t* const row = image.row(line + v) + first;
+    for (std::size_t u = 0; u < wide; ++u)
+      across[static_cast<std::size_t>(v)][u] =
+          static_cast<float>(row[u]) + part[u] * static_cast<float>(row[u + 1] - row[u]);
+  }
+  std::array<float, wide * wide> grey;
+  for (int v = 0; v < wide; ++v) {
+    const float fy = (y + static_cast<float>(v - patch_half - 1)) - static_cast<float>(line + v);
+    const auto& here = across[static_cast<std::size_t>(v)];
+    const auto& next = across[static_cast<std::size_t>(v) + 1];
+    for (std::size_t u = 0; u < wide; ++u)
+      grey[static_cast<std::size_t>(v * wide) + u] = here[u] + fy * (next[u] - here[u]);
+  }
   for (int v = 0, i = 0; v < patch_side; ++v)
     for (int u = 0; u < patch_side; ++u, ++i) {
       const float* at = grey.data() + (v + 1) * wide + u + 1;
@@ -95,6 +110,8 @@ bool residual(const Template& reference, cairn::ImageView right, float x, float 
   constexpr int most_columns = 20;  // 10 steps of at most 1.4 pixels, and the neighbour
   static_assert(most_columns >= 2 * patch_half * (1 + farthest / patch_half) + 2);
   const float step = 1 + warp(2) / patch_half, reach = step * patch_half;  // the step is 0.6 at least
+  // Only read at first, and interpolated when all of it is there, in whole registers.
+  Patch part = Patch::Zero(), here = Patch::Zero(), next = Patch::Zero();
   for (int v = -patch_half, i = 0; v <= patch_half; ++v) {
     const auto fv = static_cast<float>(v);
     const float row_x = x + warp(0) + warp(3) * fv / patch_half, row_y = y + fv + warp(1);
@@ -114,22 +131,19 @@ bool residual(const Template& reference, cairn::ImageView right, float x, float 
       blend(usual);
     else
       blend(columns);
-    // Each by itself, so that all but the reading is done in registers; the twelfth place fills the last one.
-    std::array<float, patch_side + 1> part{}, here{}, next{};
-    std::array<int, patch_side + 1> column{};
     const float start = row_x - static_cast<float>(first) - reach;
-    for (std::size_t k = 0; k < part.size(); ++k) {
+    std::array<int, patch_side> column;
+    for (std::size_t k = 0; k < patch_side; ++k) {
       const float at = start + step * static_cast<float>(static_cast<int>(k));
       column[k] = static_cast<int>(at);
-      part[k] = at - static_cast<float>(column[k]);
+      part(i + static_cast<int>(k)) = at - static_cast<float>(column[k]);
     }
-    for (std::size_t k = 0; k < patch_side; ++k) {
-      here[k] = blended[static_cast<std::size_t>(column[k])];
-      next[k] = blended[static_cast<std::size_t>(column[k]) + 1];
+    for (std::size_t k = 0; k < patch_side; ++k, ++i) {
+      here(i) = blended[static_cast<std::size_t>(column[k])];
+      next(i) = blended[static_cast<std::size_t>(column[k]) + 1];
     }
-    for (std::size_t k = 0; k < part.size(); ++k) here[k] += part[k] * (next[k] - here[k]);
-    for (std::size_t k = 0; k < patch_side; ++k, ++i) difference(i) = here[k];
   }
+  difference = here + part * (next - here);
   const float norm = centre(difference);
   if (!(norm > 0)) return false;
   difference = difference * (reference.norm / norm) - reference.grey;

@@ -30,12 +30,6 @@ public:
     h.setFromTriplets(entries_.begin(), entries_.end());
     return h;
   }
-  /// That of H + damping diag H, with an entry for each of the diagonal's.
-  [[nodiscard]] Eigen::SparseMatrix<double> damped(double damping) const {
-    Eigen::SparseMatrix<double> h = matrix();
-    for (int i = 0; i < gradient_.size(); ++i) h.coeffRef(i, i) *= 1 + damping;
-    return h;
-  }
 
   void add_cost(double half_of_square) { cost_ += half_of_square; }
   template <int N>
@@ -55,6 +49,12 @@ private:
   Eigen::VectorXd gradient_;
   double cost_ = 0;
 };
+
+/// The lower triangle of H + damping diag H, with an entry for each of the diagonal's.
+[[nodiscard]] inline Eigen::SparseMatrix<double> damped(Eigen::SparseMatrix<double> h, double damping) {
+  for (int i = 0; i < h.rows(); ++i) h.coeffRef(i, i) *= 1 + damping;
+  return h;
+}
 
 struct LevenbergOptions {
   int most_iterations = 200;
@@ -80,11 +80,12 @@ template <class Estimate, class EquationsAt, class Moved>
   LeastSquares<Estimate> best{std::move(start)};
   NormalEquations equations = equations_at(best.at);
   Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> root;
-  root.analyzePattern(equations.damped(0));
+  Eigen::SparseMatrix<double> h = equations.matrix();
+  root.analyzePattern(damped(h, 0));
   double damping = 1e-4;
   for (; best.iterations < options.most_iterations && !best.converged && damping < options.most_damping;
        ++best.iterations) {
-    root.factorize(equations.damped(damping));
+    root.factorize(damped(h, damping));
     Estimate next = moved(std::as_const(best.at), Eigen::VectorXd(root.solve(-equations.gradient())));
     NormalEquations there = equations_at(next);
     if (!(there.cost() < equations.cost())) {
@@ -94,6 +95,7 @@ template <class Estimate, class EquationsAt, class Moved>
     best.converged = equations.cost() - there.cost() < options.least_gain * equations.cost();
     best.at = std::move(next);
     equations = std::move(there);
+    if (!best.converged) h = equations.matrix();
     damping = std::max(1e-12, damping / 10);
   }
   best.cost = equations.cost();

@@ -146,7 +146,7 @@ TEST_SUITE("examples/sparse_least_squares") {
     CHECK((Eigen::MatrixXd(equations.matrix()) - lower).norm() < 1e-12 * h.norm());
     Eigen::MatrixXd damped = lower;
     damped.diagonal() *= 1.5;
-    CHECK((Eigen::MatrixXd(equations.damped(0.5)) - damped).norm() < 1e-12 * h.norm());
+    CHECK((Eigen::MatrixXd(example::damped(equations.matrix(), 0.5)) - damped).norm() < 1e-12 * h.norm());
   }
 
   TEST_CASE("least squares: a linear problem ends where Eigen's dense decomposition does") {

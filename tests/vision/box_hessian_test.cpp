@@ -53,8 +53,8 @@ TEST_SUITE("box_hessian") {
         const BoxFilter filter{lobe};
         const int first = (filter.border() + step - 1) / step * step;
         const int count = (image.width() - 1 - filter.border() - first) / step + 1;
-        std::vector<float> row(static_cast<std::size_t>(count) + 4);
-        std::vector<std::uint32_t> scratch(3 * row.size());
+        std::vector<float> row(static_cast<std::size_t>(count));
+        std::vector<std::uint32_t> scratch(3 * static_cast<std::size_t>(phases.line()));
         for (const int y : {filter.border(), image.height() - 1 - filter.border()}) {
           cairn::detail::hessian_row({phases, filter, first, y}, filter.weight(), count, row.data(),
                                      scratch.data());
@@ -80,14 +80,33 @@ TEST_SUITE("box_hessian") {
         const BoxFilter filter{lobe};
         const cairn::detail::HessianTaps taps(phases, filter, 16, 30);
         const int count = (186 - filter.border()) / step;
-        std::vector<float> narrow(static_cast<std::size_t>(count) + 4), wide(narrow.size());
-        std::vector<std::uint32_t> scratch(3 * narrow.size());
+        std::vector<float> narrow(static_cast<std::size_t>(count)), wide(narrow.size());
+        std::vector<std::uint32_t> scratch(3 * static_cast<std::size_t>(phases.line()));
         cairn::detail::hessian_row_narrow(taps, filter.weight(), count, narrow.data(), scratch.data());
-        cairn::detail::hessian_row_wide(taps, filter.weight(), count, wide.data());
+        cairn::detail::hessian_row_wide(taps, filter.weight(), count, wide.data(), scratch.data());
         for (std::size_t k = 0; k < static_cast<std::size_t>(count); ++k) CHECK(narrow[k] == wide[k]);
       }
   }
 #endif
+
+  TEST_CASE("ColumnPhases: halved from the step before they are those of the image") {
+    for (const int width : {1, 2, 7, 37, 96}) {
+      const cairn::IntegralImage sums(cairn_test::noise(width, 5, 7));
+      for (const int first : {1, 3}) {
+        cairn::detail::ColumnPhases finer, halved, direct;
+        finer.assign(sums, first);
+        halved.prepare(sums, 2 * first);
+        direct.assign(sums, 2 * first);
+        for (int y = 0; y <= sums.height(); ++y) {
+          halved.fill_row(finer, y);
+          for (int x = 0; x <= width; ++x) {
+            CHECK(*halved.at(x, y) == sums.row(y)[x]);
+            CHECK(*direct.at(x, y) == sums.row(y)[x]);
+          }
+        }
+      }
+    }
+  }
 
   TEST_CASE("hessian_row: a constant image and a slope have no response") {
     const cairn::Image slope =
@@ -97,7 +116,7 @@ TEST_SUITE("box_hessian") {
       cairn::detail::ColumnPhases phases;
       phases.assign(sums, 1);
       std::vector<float> row(64);
-      std::vector<std::uint32_t> scratch(192);
+      std::vector<std::uint32_t> scratch(3 * static_cast<std::size_t>(phases.line()));
       const BoxFilter filter{5};
       cairn::detail::hessian_row({phases, filter, 10, 30}, filter.weight(), 40, row.data(), scratch.data());
       for (int k = 0; k < 40; ++k) CHECK(row[static_cast<std::size_t>(k)] == 0);

@@ -53,6 +53,22 @@ TEST_SUITE("cell_grid") {
     }
   }
 
+#if defined(__x86_64__)
+  TEST_CASE("sample_cells: every processor gives the same bits") {
+    const cairn::IntegralImage sums(cairn_test::noise(240, 200, 5));
+    const auto at_hand = cairn::detail::processor();
+    for (const double size : {0.8, 1.3, 2.9, 3.6, 7.0, 20.0}) {
+      CellGrid<25> as_it_is, plain;
+      cairn::detail::sample_cells(sums, 70.3, 101.8, size, as_it_is);
+      cairn::detail::processor() = cairn::detail::Processor::plain;
+      cairn::detail::sample_cells(sums, 70.3, 101.8, size, plain);
+      cairn::detail::processor() = at_hand;
+      for (int j = 0; j < 25; ++j)
+        for (int i = 0; i < 25; ++i) CHECK(as_it_is.row(j)[i] == plain.row(j)[i]);
+    }
+  }
+#endif
+
   TEST_CASE("sample_cells: cells over the rim equal the nearest cell inside") {
     const cairn::Image image = cairn_test::noise(60, 50, 3);
     const cairn::IntegralImage sums(image);

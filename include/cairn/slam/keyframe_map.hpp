@@ -503,6 +503,7 @@ private:
     constexpr auto nowhere = static_cast<std::uint32_t>(-1);
     std::vector<std::uint32_t> place(keyframes_.size(), nowhere);
     std::vector<std::uint8_t> taken(landmarks_.size(), 0);
+    work.entries.reserve(matches.size());
     for (std::size_t i = 0; i < matches.size(); ++i) {
       if (!chosen.empty() && chosen[i] == 0) continue;
       const auto found = place_.find(matches[i].landmark);
@@ -511,7 +512,7 @@ private:
           detail::WhitenedSighting::of(rig_, matches[i].left, matches[i].right, matches[i].sigma);
       if (!seen) continue;
       taken[found->second] = 1;
-      Entry entry;
+      Entry& entry = work.entries.emplace_back();
       entry.match = i;
       entry.landmark = found->second;
       entry.seen = *seen;
@@ -526,7 +527,6 @@ private:
         }
         entry.place[k] = at;
       }
-      work.entries.push_back(entry);
     }
     if (poses_.contains(rig_block_)) work.blocks.push_back(rig_block_);
     work.prior = poses_.covariance(work.blocks);
@@ -540,21 +540,26 @@ private:
   void judge(const SE3& T, Work& work) {
     const detail::RigView view = view_from(T);
     for (Entry& entry : work.entries) {
-      const bool seen = look(view, entry);
+      const bool first = !work.has_solution;  // asks for nothing of the rig before the landmark has moved
+      const bool seen = look(view, entry, !first && with_rig());
       entry.chi_squared =
           seen ? chi_squared(entry, work) / pixel_factor_ : std::numeric_limits<double>::infinity();
-      if (!work.has_solution && entry.chi_squared < gate_) move_to_posterior(view, entry);
+      if (!first) continue;
+      if (entry.chi_squared < gate_)
+        move_to_posterior(view, entry);
+      else if (with_rig())
+        static_cast<void>(look(view, entry, true));
     }
   }
 
   /// The statistics of a match, brought to where the list puts the landmark. False where the view cannot see
   /// it.
-  [[nodiscard]] bool look(const detail::RigView& view, Entry& entry) const {
+  [[nodiscard]] bool look(const detail::RigView& view, Entry& entry, bool with_rig) const {
     detail::PointStatistics& s = entry.statistics;
     s = {};
     const Vector<3>& x = entry.geometry.x;
     const Vector<3>& d = entry.from_list;
-    if (with_rig()) {
+    if (with_rig) {
       entry.rig = {};
       if (!entry.seen.add(view, x, s, entry.rig)) return false;
       entry.rig.u -= transposed_product(entry.rig.E, d);
@@ -573,10 +578,10 @@ private:
     const auto keyframes = [this](std::uint32_t k) -> const detail::RigView& { return view_of(k); };
     const auto from_list = one.linearise(keyframes, at, with_rig(), entry.geometry);
     if (from_list) entry.from_list = *from_list;
-    if (from_list && look(view, entry)) return;
+    if (from_list && look(view, entry, with_rig())) return;
     entry.geometry = one;
     entry.from_list.setZero();
-    static_cast<void>(look(view, entry));
+    static_cast<void>(look(view, entry, with_rig()));
   }
 
   [[nodiscard]] double chi_squared(Entry& entry, const Work& work) const {

@@ -55,9 +55,14 @@ public:
   void operator()(const IntegralImage& sums, std::vector<Keypoint>& found, unsigned threads = 1) {
     found.clear();
     if (sums.width() == 0 || sums.height() == 0) return;
-    parallel_for(octaves_.size(), threads, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) phases_[i].assign(sums, octaves_[i].step);
-    });
+    for (std::size_t i = 0; i < octaves_.size(); ++i) phases_[i].prepare(sums, octaves_[i].step);
+    parallel_for(static_cast<std::size_t>(sums.height()) + 1, threads,
+                 [&](std::size_t begin, std::size_t end) {
+                   for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y) {
+                     phases_[0].fill_row(sums, y);
+                     for (std::size_t i = 1; i < phases_.size(); ++i) phases_[i].fill_row(phases_[i - 1], y);
+                   }
+                 });
     bands_.clear();
     for (std::size_t octave = 0; octave < octaves_.size(); ++octave) {
       const int rows = (sums.height() + octaves_[octave].step - 1) / octaves_[octave].step;

@@ -86,7 +86,7 @@ struct KeyframeLandmark : LandmarkGeometry {
   [[nodiscard]] std::optional<Vector<3>> linearise(const View& view, const Vector<3>& at, bool with_rig,
                                                    LandmarkGeometry& result) const {
     PointStatistics all;
-    RigStatistics rig;
+    RigStatistics rig{.only_E = true};
     std::array<Matrix<3>, most_sightings> A;
     for (std::size_t i = 0; i < count; ++i) {
       const RecordedSighting& s = sightings[i];
@@ -112,7 +112,7 @@ struct KeyframeLandmark : LandmarkGeometry {
   template <class View>
   [[nodiscard]] bool solve_rig(const View& view) {
     PointStatistics unused;
-    RigStatistics rig;
+    RigStatistics rig{.only_E = true};
     for (std::size_t i = 0; i < count; ++i)
       if (!sightings[i].whitened.add(view(sightings[i].keyframe), x, unused, rig)) return false;
     B = -product(S, rig.E);

@@ -56,6 +56,7 @@ struct PointStatistics {
 /// What it says of the rig's numbers c (geometry/rig_correction.hpp): with J_c = d h / d c, E = J^T J_c,
 /// D = J_c^T J_c, u = J_c^T r.
 struct RigStatistics {
+  bool only_E = false;  ///< D and u, most of the work, are not asked for
   Matrix<3, rig_numbers> E = Matrix<3, rig_numbers>::Zero();
   Matrix<rig_numbers> D = Matrix<rig_numbers>::Zero();
   RigState u = RigState::Zero();
@@ -126,9 +127,10 @@ private:
       of_rig[7] = from_centre;
       of_rig[10 + i] = centre;
     }
-    for (int c = first; c < rig_numbers; ++c) {
-      rig.u(c) += r * of_rig[c];
+    for (int c = first; c < rig_numbers; ++c)
       for (int k = 0; k < 3; ++k) rig.E(k, c) += row[k] * of_rig[c];
+    for (int c = first; c < rig_numbers && !rig.only_E; ++c) {
+      rig.u(c) += r * of_rig[c];
       for (int k = first; k < rig_numbers; ++k) rig.D(k, c) += of_rig[k] * of_rig[c];
     }
   }

@@ -11,8 +11,8 @@
 ///   response = (Dxx Dyy - (0.9 Dxy)^2) / L^4,   laplacian = sign(Dxx + Dyy)
 /// Bay, Ess, Tuytelaars and Van Gool, "Speeded-up robust features", CVIU 110(3), 2008, section 3.
 ///
-/// A row of responses costs 32 reads of the integral image a sample, whatever the scale. To keep them
-/// contiguous where only every step-th column is sampled, ColumnPhases sorts the columns by their remainder.
+/// A row of responses costs 20 reads a sample, whatever the scale. To keep them contiguous where only every
+/// step-th column is sampled, ColumnPhases sorts the columns by their remainder.
 #pragma once
 
 #include <algorithm>
@@ -29,9 +29,11 @@
 
 // GCC vectorises at -O3 only; clang always does.
 #if defined(__clang__)
-#define CAIRN_VECTORISE_FOR_AVX2 [[CAIRN_TARGET(AVX2)]]
+#define CAIRN_VECTORISED inline
+#define CAIRN_VECTORISED_FOR_AVX2 [[CAIRN_TARGET(AVX2)]] inline
 #else
-#define CAIRN_VECTORISE_FOR_AVX2 [[CAIRN_TARGET(AVX2), gnu::optimize("O3")]]
+#define CAIRN_VECTORISED [[gnu::optimize("O3")]] inline
+#define CAIRN_VECTORISED_FOR_AVX2 [[CAIRN_TARGET(AVX2), gnu::optimize("O3")]] inline
 #endif
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
@@ -49,28 +51,43 @@ struct BoxFilter {
 /// S(column + k step, row).
 class ColumnPhases {
 public:
-  /// Keeps a pointer to `sums` when step is 1, a copy otherwise.
   void assign(const IntegralImage& sums, int step) {
+    prepare(sums, step);
+    for (int y = 0; y <= sums.height(); ++y) fill_row(sums, y);
+  }
+
+  /// Makes room for all rows. Keeps a pointer to `sums` when step is 1, and there is nothing to fill.
+  void prepare(const IntegralImage& sums, int step) {
     step_ = step;
+    columns_ = sums.width() + 1;
     if (step == 1) {
       data_ = sums.row(0);
       row_stride_ = sums.row(1) - sums.row(0);
       return;
     }
-    const int columns = sums.width() + 1;
-    phase_stride_ = (columns + step - 1) / step + IntegralImage::readable_overrun;
+    phase_stride_ = (columns_ + step - 1) / step + IntegralImage::readable_overrun;
     row_stride_ = phase_stride_ * step;
     copy_.resize(room_for(static_cast<std::size_t>(row_stride_), static_cast<std::size_t>(sums.height()) + 1,
                           "image"));
     data_ = copy_.data();
-    for (int y = 0; y <= sums.height(); ++y) {
-      const std::uint32_t* const from = sums.row(y);
-      for (int phase = 0; phase < step; ++phase) {
-        std::uint32_t* to = copy_.data() + y * row_stride_ + phase * phase_stride_;
-        for (int x = phase; x < columns; x += step) *to++ = from[x];
-      }
+  }
+
+  void fill_row(const IntegralImage& sums, int y) noexcept {
+    for (int phase = 0; step_ > 1 && phase < step_; ++phase) {
+      std::uint32_t* to = phase_of(phase, y);
+      for (int x = phase; x < columns_; x += step_) *to++ = sums.row(y)[x];
     }
   }
+
+  /// The same from the row at half this step, whose phases fall apart into two each.
+  void fill_row(const ColumnPhases& finer, int y) noexcept {
+    for (int phase = 0; phase < finer.step_; ++phase)
+      split(finer.at(phase, y), phase_of(phase, y), phase_of(phase + finer.step_, y),
+            phase_stride_ - IntegralImage::readable_overrun);
+  }
+
+  /// Numbers of a row, of all phases.
+  [[nodiscard]] std::ptrdiff_t line() const noexcept { return step_ == 1 ? columns_ : row_stride_; }
 
   [[nodiscard]] const std::uint32_t* at(int column, int row) const noexcept {
     const std::uint32_t* const line = data_ + row * row_stride_;
@@ -78,95 +95,109 @@ public:
   }
 
 private:
+  [[nodiscard]] std::uint32_t* phase_of(int phase, int y) noexcept {
+    return copy_.data() + y * row_stride_ + phase * phase_stride_;
+  }
+
+  static void split(const std::uint32_t* from, std::uint32_t* __restrict even, std::uint32_t* __restrict odd,
+                    std::ptrdiff_t count) noexcept {
+    for (std::ptrdiff_t k = 0; k < count; ++k) {
+      even[k] = from[2 * k];
+      odd[k] = from[2 * k + 1];
+    }
+  }
+
   int step_ = 1;
+  int columns_ = 0;
   std::ptrdiff_t phase_stride_ = 0;
   std::ptrdiff_t row_stride_ = 0;
   const std::uint32_t* data_ = nullptr;
   std::vector<std::uint32_t> copy_;
 };
 
-/// Corners of two boxes: top left, top right, bottom left, bottom right of one, then of the other.
-using BoxPair = std::array<const std::uint32_t*, 8>;
-
-/// The boxes of one row of responses, at its first sample: Dxx, Dyy and the two halves of Dxy.
+/// The boxes of one row of responses: rows of the integral image that they lie between, and the places in
+/// these at which they begin and end for the first sample.
 struct HessianTaps {
-  BoxPair xx, yy, above, below;
+  std::array<const std::uint32_t*, 2> xx_rows;           ///< top, bottom
+  std::array<const std::uint32_t*, 4> yy_rows, xy_rows;  ///< of the outer and the inner box; of two boxes
+  std::array<std::ptrdiff_t, 4> xx_places, xy_places;
+  std::array<std::ptrdiff_t, 2> yy_places;
+  std::ptrdiff_t line;  ///< numbers in a row
 
   /// Taps for samples centred on (x, y), (x + step, y), ...
-  HessianTaps(const ColumnPhases& sums, BoxFilter filter, int x, int y) noexcept {
+  HessianTaps(const ColumnPhases& sums, BoxFilter filter, int x, int y) noexcept : line(sums.line()) {
     const int l = filter.lobe;
     const int b = filter.border();
     const int h = (l - 1) / 2;
-    const auto pair = [&](int left, int right, int top, int bottom, int left2, int right2, int top2,
-                          int bottom2) {
-      return BoxPair{sums.at(x + left, y + top),      sums.at(x + right, y + top),
-                     sums.at(x + left, y + bottom),   sums.at(x + right, y + bottom),
-                     sums.at(x + left2, y + top2),    sums.at(x + right2, y + top2),
-                     sums.at(x + left2, y + bottom2), sums.at(x + right2, y + bottom2)};
-    };
-    xx = pair(-b, b + 1, -l + 1, l, -h, h + 1, -l + 1, l);
-    yy = pair(-l + 1, l, -b, b + 1, -l + 1, l, -h, h + 1);
-    above = pair(1, l + 1, -l, 0, -l, 0, -l, 0);
-    below = pair(1, l + 1, 1, l + 1, -l, 0, 1, l + 1);
+    const auto row = [&](int down) { return sums.at(0, y + down); };
+    const auto place = [&](int right) { return sums.at(x + right, 0) - sums.at(0, 0); };
+    xx_rows = {row(-l + 1), row(l)};
+    xx_places = {place(-b), place(-h), place(h + 1), place(b + 1)};
+    yy_rows = {row(-b), row(-h), row(h + 1), row(b + 1)};
+    yy_places = {place(-l + 1), place(l)};
+    xy_rows = {row(-l), row(0), row(1), row(l + 1)};
+    xy_places = {place(-l), place(0), place(1), place(l + 1)};
   }
 };
 
-/// First box - Weight * second box at the samples k, ..., k + 3.
-template <int Weight>
-[[nodiscard, gnu::always_inline]] inline Unsigned4 box_difference(const BoxPair& taps, int k) noexcept {
-  const auto corner = [&](std::size_t i) { return load<Unsigned4>(taps[i] + k); };
-  const Unsigned4 first = (corner(3) - corner(2)) - (corner(1) - corner(0));
-  const Unsigned4 second = (corner(7) - corner(6)) - (corner(5) - corner(4));
-  return Weight == 3 ? first - (second + second + second) : first - second;
-}
-
-/// Four lanes, on every processor. Pass by pass, so that each loop's eight pointers fit the registers.
-inline void hessian_row_narrow(const HessianTaps& taps, float weight, int count, float* out,
-                               std::uint32_t* scratch) noexcept {
-  const int room = (count + 3) / 4 * 4;
-  for (int k = 0; k < count; k += 4) store(box_difference<3>(taps.xx, k), scratch + k);
-  for (int k = 0; k < count; k += 4) store(box_difference<3>(taps.yy, k), scratch + room + k);
-  for (int k = 0; k < count; k += 4) store(box_difference<1>(taps.above, k), scratch + 2 * room + k);
-  for (int k = 0; k < count; k += 4) {
-    const Unsigned4 below = box_difference<1>(taps.below, k);
-    const Float4 dxx = to_float(load<Unsigned4>(scratch + k)) * weight;
-    const Float4 dyy = to_float(load<Unsigned4>(scratch + room + k)) * weight;
-    const Float4 dxy = to_float(load<Unsigned4>(scratch + 2 * room + k) - below) * (0.9F * weight);
-    store(dxx * dyy - dxy * dxy, out + k);
+/// What the rows of the boxes differ by, at every column: of Dxx, Dyy and Dxy.
+[[gnu::always_inline]] inline void subtract_rows(const HessianTaps& taps, std::uint32_t* __restrict xx,
+                                                 std::uint32_t* __restrict yy,
+                                                 std::uint32_t* __restrict xy) noexcept {
+  const std::uint32_t *const x0 = taps.xx_rows[0], *const x1 = taps.xx_rows[1];
+  const std::uint32_t *const y0 = taps.yy_rows[0], *const y1 = taps.yy_rows[1], *const y2 = taps.yy_rows[2],
+                             *const y3 = taps.yy_rows[3];
+  const std::uint32_t *const c0 = taps.xy_rows[0], *const c1 = taps.xy_rows[1], *const c2 = taps.xy_rows[2],
+                             *const c3 = taps.xy_rows[3];
+  for (std::ptrdiff_t k = 0, end = taps.line; k < end; ++k) {
+    xx[k] = x1[k] - x0[k];
+    yy[k] = (y3[k] - y0[k]) - 3 * (y2[k] - y1[k]);
+    xy[k] = (c1[k] - c0[k]) - (c3[k] - c2[k]);
   }
 }
 
-#if defined(__x86_64__)
-/// The same bits (no fused multiply-add), eight at a time by AVX2, left to the compiler's vectoriser.
-CAIRN_VECTORISE_FOR_AVX2 inline void hessian_row_wide(const HessianTaps& taps, float weight, int count,
-                                                      float* out) noexcept {
-  const BoxPair xx = taps.xx, yy = taps.yy, above = taps.above, below = taps.below;
+/// The boxes of a derivative share rows, so these are subtracted once, for all columns, and then columns of
+/// what is left: 10 reads and 10 more, where each corner by itself would be 32. Sums modulo 2^32 are the same
+/// in any order.
+[[gnu::always_inline]] inline void respond(const HessianTaps& taps, float weight, int count,
+                                           float* __restrict out, std::uint32_t* scratch) noexcept {
+  std::uint32_t *const xx = scratch, *const yy = xx + taps.line, *const xy = yy + taps.line;
+  subtract_rows(taps, xx, yy, xy);
+  const std::uint32_t *const x0 = xx + taps.xx_places[0], *const x1 = xx + taps.xx_places[1],
+                             *const x2 = xx + taps.xx_places[2], *const x3 = xx + taps.xx_places[3];
+  const std::uint32_t *const y0 = yy + taps.yy_places[0], *const y1 = yy + taps.yy_places[1];
+  const std::uint32_t *const c0 = xy + taps.xy_places[0], *const c1 = xy + taps.xy_places[1],
+                             *const c2 = xy + taps.xy_places[2], *const c3 = xy + taps.xy_places[3];
   const float cross_weight = 0.9F * weight;
   for (std::ptrdiff_t k = 0; k < count; ++k) {
-    const std::uint32_t xx_whole = (xx[3][k] - xx[2][k]) - (xx[1][k] - xx[0][k]);
-    const std::uint32_t xx_middle = (xx[7][k] - xx[6][k]) - (xx[5][k] - xx[4][k]);
-    const std::uint32_t yy_whole = (yy[3][k] - yy[2][k]) - (yy[1][k] - yy[0][k]);
-    const std::uint32_t yy_middle = (yy[7][k] - yy[6][k]) - (yy[5][k] - yy[4][k]);
-    const std::uint32_t right_above = (above[3][k] - above[2][k]) - (above[1][k] - above[0][k]);
-    const std::uint32_t left_above = (above[7][k] - above[6][k]) - (above[5][k] - above[4][k]);
-    const std::uint32_t right_below = (below[3][k] - below[2][k]) - (below[1][k] - below[0][k]);
-    const std::uint32_t left_below = (below[7][k] - below[6][k]) - (below[5][k] - below[4][k]);
-    const float dxx = static_cast<float>(static_cast<std::int32_t>(xx_whole - 3 * xx_middle)) * weight;
-    const float dyy = static_cast<float>(static_cast<std::int32_t>(yy_whole - 3 * yy_middle)) * weight;
-    const float dxy = static_cast<float>(static_cast<std::int32_t>((right_above - left_above) -
-                                                                   (right_below - left_below))) *
-                      cross_weight;
+    const std::uint32_t in_xx = (x3[k] - x0[k]) - 3 * (x2[k] - x1[k]);
+    const std::uint32_t in_yy = y1[k] - y0[k];
+    const std::uint32_t in_xy = (c3[k] - c2[k]) - (c1[k] - c0[k]);
+    const float dxx = static_cast<float>(static_cast<std::int32_t>(in_xx)) * weight;
+    const float dyy = static_cast<float>(static_cast<std::int32_t>(in_yy)) * weight;
+    const float dxy = static_cast<float>(static_cast<std::int32_t>(in_xy)) * cross_weight;
     out[k] = dxx * dyy - dxy * dxy;
   }
 }
+
+/// For every processor.
+CAIRN_VECTORISED void hessian_row_narrow(const HessianTaps& taps, float weight, int count, float* out,
+                                         std::uint32_t* scratch) noexcept {
+  respond(taps, weight, count, out, scratch);
+}
+#if defined(__x86_64__)
+/// The same bits (no fused multiply-add), eight at a time.
+CAIRN_VECTORISED_FOR_AVX2 void hessian_row_wide(const HessianTaps& taps, float weight, int count, float* out,
+                                                std::uint32_t* scratch) noexcept {
+  respond(taps, weight, count, out, scratch);
+}
 #endif
 
-/// `count` responses into `out`, which has room for three more; `scratch` has room for 3 (count + 3). Reads
-/// up to three entries behind the last tap.
+/// `count` responses into `out`; `scratch` has room for three lines of the phases.
 inline void hessian_row(const HessianTaps& taps, float weight, int count, float* out,
                         std::uint32_t* scratch) noexcept {
 #if defined(__x86_64__)
-  if (processor() >= Processor::avx2) return hessian_row_wide(taps, weight, count, out);
+  if (processor() >= Processor::avx2) return hessian_row_wide(taps, weight, count, out, scratch);
 #endif
   hessian_row_narrow(taps, weight, count, out, scratch);
 }

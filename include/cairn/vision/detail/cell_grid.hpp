@@ -19,6 +19,7 @@
 #include <cstddef>
 #include <cstdint>
 
+#include <cairn/simd/processor.hpp>
 #include <cairn/version.hpp>
 #include <cairn/vision/detail/lanes.hpp>
 #include <cairn/vision/integral_image.hpp>
@@ -79,40 +80,83 @@ void fill_rim(const CellAxis<N>& across, const CellAxis<N>& down, CellGrid<N>& g
   }
 }
 
+/// S of every row of cells of an upright grid, at columns beside the boundaries of its cells.
+template <int N>
+struct CellStrips {
+  static constexpr std::size_t count = CellAxis<N>::count;
+  static constexpr std::size_t most = (3 * count + 7) / 8 * 8;
+  alignas(32) std::array<std::array<float, most>, N + 1> rows;  ///< [j + 1]: of cells j
+  std::array<std::size_t, count> place;                         ///< of the columns beside boundary k
+
+  /// Boundaries of small cells are so near each other that all columns are read as they stand; of larger ones
+  /// the two columns beside each boundary are put together first.
+  [[gnu::always_inline]] void assign(const IntegralImage& sums, const CellAxis<N>& across,
+                                     const CellAxis<N>& down) noexcept {
+    const int first = across.whole[0], span = across.whole[N] + 2 - first;
+    const bool dense = span <= static_cast<int>(most);
+    const std::size_t columns = dense ? static_cast<std::size_t>(span) : 2 * count;
+    for (std::size_t k = 0; k < count; ++k)
+      place[k] = dense ? static_cast<std::size_t>(across.whole[k] - first) : 2 * k;
+    std::array<std::uint32_t, 2 * count> together[2];
+    const auto read = [&](int row, std::array<std::uint32_t, 2 * count>& pairs)
+                          CAIRN_INLINED -> const std::uint32_t* {
+      const std::uint32_t* const all = sums.row(row);
+      if (dense) return all + first;
+      for (std::size_t k = 0; k < count; ++k) {
+        pairs[2 * k] = all[across.whole[k]];
+        pairs[2 * k + 1] = all[across.whole[k] + 1];
+      }
+      return pairs.data();
+    };
+    // S at the boundary above, from the first column on, and how much of the next row belongs to it.
+    alignas(32) std::array<std::uint32_t, most> upper{};
+    alignas(32) std::array<float, most> upper_part{};
+    for (std::size_t j = 0; j <= N; ++j) {
+      const std::uint32_t* const here = read(down.whole[j], together[0]);
+      const std::uint32_t* const next = read(down.whole[j] + 1, together[1]);
+      const std::uint32_t here_base = here[0], next_base = next[0];
+      const float fraction = down.parts[2 * j + 1];
+      float* const row = rows[j].data();
+      for (std::size_t k = 0; k < columns; ++k) {
+        const std::uint32_t above = here[k] - here_base, below = next[k] - next_base;
+        const float part = static_cast<float>(static_cast<std::int32_t>(below - above)) * fraction;
+        row[k] = static_cast<float>(static_cast<std::int32_t>(above - upper[k])) + (part - upper_part[k]);
+        upper[k] = above;
+        upper_part[k] = part;
+      }
+    }
+  }
+
+  /// S at the boundaries first, and all of it before differences are taken: what has just been written in
+  /// other pieces is read slowly.
+  [[gnu::always_inline]] void cells(const CellAxis<N>& across, CellGrid<N>& grid) const noexcept {
+    static_assert(CellGrid<N>::stride >= static_cast<int>(count));
+    for (int j = 0; j < N; ++j) {
+      const float* const row = rows[static_cast<std::size_t>(j) + 1].data();
+      const auto boundaries = [&](std::size_t k) CAIRN_INLINED {  // two, of two columns each, weighted
+        return load_pairs(row + place[k], row + place[k + 1]) * load<Float4>(&across.parts[2 * k]);
+      };
+      for (std::size_t k = 0; k < count; k += 4) {
+        const Float4 two = boundaries(k), two_more = boundaries(k + 2);
+        store(shuffled<0, 2, 4, 6>(two, two_more) + shuffled<1, 3, 5, 7>(two, two_more), grid.row(j) + k);
+      }
+    }
+    for (int j = 0; j < N; ++j)
+      for (int i = 0; i < N; ++i) grid.row(j)[i] = grid.row(j)[i + 1] - grid.row(j)[i];
+  }
+};
+
 /// Cells of side `size` about (x, y) [pixels], upright. The image must not be empty.
 /// Integers are subtracted before they become floats: what is rounded is never more than one row of cells.
 template <int N>
 void sample_cells(const IntegralImage& sums, double x, double y, double size, CellGrid<N>& grid) noexcept {
-  constexpr std::size_t count = CellAxis<N>::count;
   const CellAxis<N> across(x, size, sums.width());
   const CellAxis<N> down(y, size, sums.height());
-  std::array<Unsigned4, count / 2> upper{};    // S at the boundary above, from the first column on,
-  std::array<Float4, count / 2> upper_part{};  // and how much of the next row of pixels belongs to it
-  std::array<float, count> line{};             // S of a row of cells at its boundaries
-  for (std::size_t j = 0; j <= N; ++j) {
-    const std::uint32_t* const here = sums.row(down.whole[j]);
-    const std::uint32_t* const next = sums.row(down.whole[j] + 1);
-    const std::uint32_t here_base = here[across.whole[0]];
-    const std::uint32_t next_base = next[across.whole[0]];
-    const float fraction = down.parts[2 * j + 1];
-    const auto strip = [&](std::size_t pair) {  // two boundaries, two entries each, weighted
-      const int left = across.whole[2 * pair], right = across.whole[2 * pair + 1];
-      const Unsigned4 above = load_pairs(here + left, here + right) - here_base;
-      const Unsigned4 below = load_pairs(next + left, next + right) - next_base;
-      const Float4 part = to_float(below - above) * fraction;
-      const Float4 sum = to_float(above - upper[pair]) + (part - upper_part[pair]);
-      upper[pair] = above;
-      upper_part[pair] = part;
-      return sum * load<Float4>(&across.parts[4 * pair]);
-    };
-    for (std::size_t k = 0; k < count; k += 4) {
-      const Float4 two = strip(k / 2), two_more = strip(k / 2 + 1);
-      store(shuffled<0, 2, 4, 6>(two, two_more) + shuffled<1, 3, 5, 7>(two, two_more), &line[k]);
-    }
-    if (j == 0) continue;
-    float* const cells = grid.row(static_cast<int>(j) - 1);
-    for (std::size_t i = 0; i < N; ++i) cells[i] = line[i + 1] - line[i];
-  }
+  with_avx2_lanes([&]() CAIRN_INLINED {
+    CellStrips<N> strips;
+    strips.assign(sums, across, down);
+    strips.cells(across, grid);
+  });
   if (!across.all_inside() || !down.all_inside()) fill_rim(across, down, grid);
 }
 

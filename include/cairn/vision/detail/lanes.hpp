@@ -6,8 +6,9 @@
 /// plain instructions elsewhere. The same operations in the same order everywhere, so nothing depends on
 /// -march (but for fused multiply-add, if that allows it) or on the level of optimisation.
 ///
-/// Eight lanes chosen at run time pay in one place, box_hessian.hpp, where they are left to the compiler's
-/// vectoriser: GCC splits longer vectors of an inlined function before it sees that the caller is for AVX2.
+/// Eight lanes chosen at run time pay in box_hessian.hpp and cell_grid.hpp, where they are left to the
+/// compiler's vectoriser: GCC splits longer vectors of an inlined function before it sees that the caller is
+/// for AVX2.
 #pragma once
 
 #include <cstdint>
@@ -28,6 +29,11 @@ template <class Number>
                                                          const Number* also_from) noexcept {
   static_assert(sizeof(Number) == 4);
   return reinterpret_cast<Lanes<Number, 4>>(Long2{load<std::uint64_t>(from), load<std::uint64_t>(also_from)});
+}
+
+/// Without the sign bit: one instruction, where a comparison takes five.
+[[nodiscard, gnu::always_inline]] inline Float4 absolute(Float4 numbers) noexcept {
+  return reinterpret_cast<Float4>(reinterpret_cast<Signed4>(numbers) & 0x7FFFFFFF);
 }
 
 [[nodiscard, gnu::always_inline]] inline Float4 to_float(Unsigned4 two_complement) noexcept {

@@ -86,7 +86,7 @@ public:
         stride_((sums.width() + octave.step - 1) / octave.step + 16) {
     const auto columns = static_cast<std::size_t>(stride_);
     memory.responses.resize(columns * static_cast<std::size_t>(octave.count * 3));
-    memory.boxes.resize(columns * 3);
+    memory.boxes.resize(static_cast<std::size_t>(phases.line()) * 3);
     memory.columns.resize(columns);
   }
 

@@ -72,14 +72,17 @@ struct HaarResponses {
 using ResponseGrid = std::array<std::array<HaarResponses, responses_a_side / 4>, responses_a_side>;
 
 inline void haar_responses(const DescriptorCells& grid, ResponseGrid& responses) noexcept {
-  for (int j = 0; j < responses_a_side; ++j)
-    for (int i = 0; i < responses_a_side; i += 4) {
-      const auto above = load<Float4>(grid.row(j) + i), above_right = load<Float4>(grid.row(j) + i + 1);
+  for (int i = 0; i < responses_a_side; i += 4) {
+    auto above = load<Float4>(grid.row(0) + i), above_right = load<Float4>(grid.row(0) + i + 1);
+    for (int j = 0; j < responses_a_side; ++j) {
       const auto below = load<Float4>(grid.row(j + 1) + i);
       const auto below_right = load<Float4>(grid.row(j + 1) + i + 1);
       responses[static_cast<std::size_t>(j)][static_cast<std::size_t>(i / 4)] = {
           (above_right + below_right) - (above + below), (below + below_right) - (above + above_right)};
+      above = below;
+      above_right = below_right;
     }
+  }
 }
 
 /// Adds four neighbouring responses to the sums of their columns: 4 sums, or 8 split by signs.
@@ -87,7 +90,7 @@ template <std::size_t Sums>
 [[gnu::always_inline]] inline void add_responses(const HaarResponses& response, float weight,
                                                  std::array<Float4, Sums>& sums) noexcept {
   const Float4 dx = weight * response.dx, dy = weight * response.dy;
-  const Float4 abs_dx = dx < 0 ? -dx : dx, abs_dy = dy < 0 ? -dy : dy;
+  const Float4 abs_dx = absolute(dx), abs_dy = absolute(dy);
   const Float4 none{};
   if constexpr (Sums == 4) {
     sums[0] += dx;
@@ -117,7 +120,10 @@ void sum_subregions(const ResponseGrid& responses, const SubregionWeights& weigh
       for (int j = down.begin; j < down.end; ++j)
         add_responses(responses[static_cast<std::size_t>(j)][i], down.weight[static_cast<std::size_t>(j)],
                       columns);
+      const int column = 4 * static_cast<int>(i);
       for (std::size_t across = 0; across < 4; ++across) {
+        if (column >= weights.subregions[across].end || column + 4 <= weights.subregions[across].begin)
+          continue;
         const auto weight = load<Float4>(&weights.subregions[across].weight[4 * i]);
         for (std::size_t n = 0; n < Sums; ++n) totals[across][n] += weight * columns[n];
       }
