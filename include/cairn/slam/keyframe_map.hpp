@@ -539,8 +539,8 @@ private:
   /// short.
   void judge(const SE3& T, Work& work) {
     const detail::RigView view = view_from(T);
+    const bool first = !work.has_solution;  // asks for nothing of the rig before the landmark has moved
     for (Entry& entry : work.entries) {
-      const bool first = !work.has_solution;  // asks for nothing of the rig before the landmark has moved
       const bool seen = look(view, entry, !first && with_rig());
       entry.chi_squared =
           seen ? chi_squared(entry, work) / pixel_factor_ : std::numeric_limits<double>::infinity();
@@ -552,14 +552,14 @@ private:
     }
   }
 
-  /// The statistics of a match, brought to where the list puts the landmark. False where the view cannot see
-  /// it.
-  [[nodiscard]] bool look(const detail::RigView& view, Entry& entry, bool with_rig) const {
+  /// The statistics of a match, and where asked those of the rig, brought to where the list puts the
+  /// landmark. False where the view cannot see it.
+  [[nodiscard]] bool look(const detail::RigView& view, Entry& entry, bool of_rig) const {
     detail::PointStatistics& s = entry.statistics;
     s = {};
     const Vector<3>& x = entry.geometry.x;
     const Vector<3>& d = entry.from_list;
-    if (with_rig) {
+    if (of_rig) {
       entry.rig = {};
       if (!entry.seen.add(view, x, s, entry.rig)) return false;
       entry.rig.u -= transposed_product(entry.rig.E, d);

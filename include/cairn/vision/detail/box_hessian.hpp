@@ -73,7 +73,8 @@ public:
   }
 
   void fill_row(const IntegralImage& sums, int y) noexcept {
-    for (int phase = 0; step_ > 1 && phase < step_; ++phase) {
+    if (step_ == 1) return;
+    for (int phase = 0; phase < step_; ++phase) {
       std::uint32_t* to = phase_of(phase, y);
       for (int x = phase; x < columns_; x += step_) *to++ = sums.row(y)[x];
     }
