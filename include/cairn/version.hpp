@@ -14,6 +14,11 @@
 #elif __cplusplus < 202002L
 #error "cairn needs C++20: -std=c++20"
 #endif
+// With it a NaN would be accepted and go into the belief: isfinite() is true of everything, and x - x is
+// zero.
+#if (defined(__FINITE_MATH_ONLY__) && __FINITE_MATH_ONLY__) || defined(__ASSOCIATIVE_MATH__)
+#error "cairn has to see a NaN: no -ffast-math, -ffinite-math-only or -fassociative-math where it is included"
+#endif
 
 #define CAIRN_VERSION_MAJOR 0
 #define CAIRN_VERSION_MINOR 1

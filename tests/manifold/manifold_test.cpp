@@ -1,10 +1,13 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 #include <cmath>
+#include <type_traits>
 
 #include <doctest/doctest.h>
 
 #include <cairn/manifold/manifold.hpp>
+#include <cairn/manifold/product.hpp>
+#include <cairn/manifold/so2.hpp>
 
 namespace {
 
@@ -49,5 +52,14 @@ TEST_SUITE("manifold") {
     const Dial eleven{11};
     CHECK(cairn::retract(eleven, Vector<1>(2.0)).hours == doctest::Approx(1));
     CHECK(cairn::local(eleven, Dial{1})(0) == doctest::Approx(2));
+  }
+
+  TEST_CASE("manifold: several parts in braces are a Product, one part is none by chance") {
+    using Pair = cairn::Product<cairn::SO2, Vector<2>>;
+    const auto turned = [](const Pair& x) -> Pair { return {x.part<0>() * cairn::SO2(1.0), x.part<1>()}; };
+    const Pair y = turned({cairn::SO2(0.5), Vector<2>(3, 4)});
+    CHECK(y.part<0>().angle() == doctest::Approx(1.5));
+    CHECK(y.part<1>() == Vector<2>(3, 4));
+    CHECK(!std::is_convertible_v<cairn::SO2, cairn::Product<cairn::SO2>>);
   }
 }

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 #include <cmath>
+#include <string_view>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -117,6 +118,7 @@ TEST_SUITE("scan/match") {
     }
     const MatchResult empty = match(OccupancyGrid(), points, SE2(), SE2(), Matrix<3>::Zero());
     CHECK(empty.status == MatchStatus::few_inliers);
+    CHECK(std::string_view(explain(empty.status)).starts_with("few inliers"));
     CHECK(match(grid, {}, SE2(), SE2(), Matrix<3>::Zero()).status == MatchStatus::few_inliers);
     CHECK(std::isfinite(log_likelihood(grid, points, SE2(1e15, 0, 0), {})));
   }

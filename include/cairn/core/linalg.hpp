@@ -5,7 +5,9 @@
 /// The only door to Eigen: the vector and matrix names that every other header uses.
 ///
 /// Only Eigen/Core comes in here, and no header takes a decomposition of Eigen's, so that nobody pays for
-/// including them: for symmetric matrices there are core/cholesky.hpp and core/symmetric_eigen.hpp.
+/// including them: for symmetric matrices there are core/cholesky.hpp and core/symmetric_eigen.hpp. A program
+/// that writes m.inverse(), a.cross(b) or a decomposition includes Eigen/Dense itself; the linker misses them
+/// otherwise.
 #pragma once
 
 #include <Eigen/Core>

@@ -121,7 +121,7 @@ struct AugmentedUnscented {
 
   /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite, a P or Q that is no
   /// covariance.
-  template <class F, class U = typename F::Control>
+  template <class F, class U = detail::ControlOf<F>>
     requires(AnyProcess<F> || detail::explain_process<F>)
   Status predict(Gaussian<typename F::State>& belief, const F& process, double dt,
                  const U& control = detail::no_control<U>()) const {
@@ -161,7 +161,7 @@ struct AugmentedUnscented {
 
   /// One predict and one update with points drawn once. Refused: as either of them; the belief then stays
   /// where it was before the prediction. No point carries stabilising noise: it has to be zero here.
-  template <class F, class H, class U = typename F::Control, class T = typename H::Measurement>
+  template <class F, class H, class U = detail::ControlOf<F>, class T = typename H::Measurement>
     requires(AnyProcess<F> || detail::explain_process<F>) &&
             (AnyMeasurement<H> || detail::explain_sensor<H>) &&
             std::same_as<typename F::State, typename H::State>

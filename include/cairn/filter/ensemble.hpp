@@ -86,7 +86,7 @@ struct EnsembleKalman {
   double inflation = 1.0;  ///< distances from the mean are multiplied by this before an update; >= 1
 
   /// Moves every member by dt and a draw of the noise.
-  template <class F, class U = typename F::Control>
+  template <class F, class U = detail::ControlOf<F>>
     requires(AnyProcess<F> || detail::explain_process<F>)
   Status predict(Ensemble<typename F::State>& belief, const F& process, double dt, Random& random,
                  const U& control = detail::no_control<U>()) const {

@@ -44,7 +44,7 @@ struct Extended {
   double settled = 1e-3;           ///< refused as not_converged where they end with a larger change
 
   /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite.
-  template <class F, class U = typename F::Control>
+  template <class F, class U = detail::ControlOf<F>>
     requires(LinearisedProcess<F> || detail::explain_process<F> ||
              detail::explain_jacobian<F, ProcessModel<F>>)
   Status predict(Gaussian<typename F::State>& belief, const F& process, double dt,

@@ -129,5 +129,17 @@ consteval bool demand_proper_belief() {
   return true;
 }
 
+/// The sentence for what runs any filter over one belief by one process.
+template <class Filter, class B, class F>
+consteval bool demand_one_belief() {
+  static_assert(
+      requires(const Filter& filter, B& belief, const F& process, const typename F::Control& control) {
+        filter.predict(belief, process, 1.0, control);
+      },
+      "cairn: Timeline and Recorder run filters of one Gaussian belief and one process (the table of "
+      "docs/filters.md); Interacting, ParticleFilter and JointExtended have beliefs of another kind");
+  return true;
+}
+
 }  // namespace detail
 }}  // namespace cairn::CAIRN_ABI

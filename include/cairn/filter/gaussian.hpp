@@ -14,6 +14,7 @@
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/random.hpp>
+#include <cairn/filter/detail/explain_sizes.hpp>
 #include <cairn/filter/model.hpp>
 #include <cairn/manifold/manifold.hpp>
 #include <cairn/version.hpp>
@@ -35,7 +36,7 @@ namespace detail {
 enum class Form { standard, joseph, sequential };
 
 /// Truth = retract(mean, d), d ~ N(0, covariance). A plain aggregate; checked() is for numbers from outside.
-template <Manifold X>
+template <detail::StateAsked X>
 struct Gaussian {
   using State = X;
   using Scalar = ScalarOf<X>;
@@ -134,7 +135,7 @@ template <int N, class S>
 
 }  // namespace detail
 
-template <Manifold X>
+template <detail::StateAsked X>
 Gaussian<X> Gaussian<X>::checked(const X& mean, const Covariance& covariance) {
   using std::abs;
   using std::sqrt;

@@ -279,7 +279,7 @@ struct InformationFilter {
 
   /// Moves the belief by one step of dt. The mean of what is known is moved by the process first, so the
   /// point of linearisation follows the estimate. Refused: a singular F, a Q that is no covariance.
-  template <class F, class U = typename F::Control>
+  template <class F, class U = detail::ControlOf<F>>
     requires(LinearisedProcess<F> || detail::explain_process<F> ||
              detail::explain_jacobian<F, ProcessModel<F>>)
   Status predict(InformationBelief<typename F::State>& belief, const F& process, double dt,

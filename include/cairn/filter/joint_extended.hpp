@@ -56,6 +56,23 @@
 
 namespace cairn { inline namespace CAIRN_ABI {
 
+namespace detail {
+
+/// The models that JointExtended takes, or the sentence: for its functions, not for asking.
+template <class F>
+concept JointProcess = LinearisedProcess<F> || explain_process<F> || explain_jacobian<F, ProcessModel<F>>;
+template <class H>
+concept JointSensor =
+    LinearisedMeasurement<H> || explain_sensor<H> || explain_jacobian<H, MeasurementModel<H>>;
+/// The same of blocks behind a control. Without a control the first block may stand where it would: there
+/// the other predict() has the word.
+template <class F, class... X>
+concept NamesAllBehindControl =
+    SpeaksOf<typename F::State, X...> ||
+    (!std::same_as<typename F::Control, NoControl> && explain_blocks<typename F::State, X...>);
+
+}  // namespace detail
+
 /// Several measurements of one moment, linearised one by one, to be taken in at once: one pass over the
 /// covariance in place of one each. Kept in units of their noise. Also the way to a measurement of blocks
 /// whose number is known only at run time. Linearised at the means as they are: apply it before they change.
@@ -74,7 +91,7 @@ public:
   /// One more measurement of named blocks. Refused, and the stack left: an unknown block, what is not finite,
   /// a noise that is not positive definite.
   template <LinearisedMeasurement H, class... Kinds, class... X>
-    requires detail::SpeaksOf<typename H::State, X...>
+    requires detail::NamesAll<typename H::State, X...>
   Status add(const JointGaussian<Kinds...>& belief, const H& sensor, const typename H::Measurement& z,
              BlockId<X>... ids);
 
@@ -121,28 +138,28 @@ struct JointExtended {
 
   /// Moves the named blocks, which together are the process's State, by one step of dt. Their correlations
   /// with all others are carried along; the others stay. O(n d^2).
-  template <LinearisedProcess F, class... Kinds, class... X>
-    requires detail::SpeaksOf<typename F::State, X...>
+  template <detail::JointProcess F, class... Kinds, class... X>
+    requires detail::NamesAllBehindControl<F, X...>
   Status predict(JointGaussian<Kinds...>& belief, const F& process, double dt,
                  const typename F::Control& control, BlockId<X>... ids) const;
-  template <LinearisedProcess F, class... Kinds, class... X>
-    requires(detail::SpeaksOf<typename F::State, X...> && std::same_as<typename F::Control, NoControl>)
+  template <detail::JointProcess F, class... Kinds, class... X>
+    requires(std::same_as<typename F::Control, NoControl> && detail::NamesAll<typename F::State, X...>)
   Status predict(JointGaussian<Kinds...>& belief, const F& process, double dt, BlockId<X>... ids) const {
     return predict(belief, process, dt, NoControl{}, ids...);
   }
 
   /// Takes in the measurement z of the named blocks, which together are the sensor's State, or refuses it.
   /// The innovation is the one before the update, whatever the iterations. O(n^2 m).
-  template <LinearisedMeasurement H, class... Kinds, class... X>
-    requires detail::SpeaksOf<typename H::State, X...>
+  template <detail::JointSensor H, class... Kinds, class... X>
+    requires detail::NamesAll<typename H::State, X...>
   Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> update(
       JointGaussian<Kinds...>& belief, const H& sensor, const typename H::Measurement& z,
       BlockId<X>... ids) const;
 
   /// What update() would say of it, but for what only updating shows: digits that are lost, iterations that
   /// do not converge. Nothing is changed. O(d^2 + m^3), whatever the number of blocks.
-  template <LinearisedMeasurement H, class... Kinds, class... X>
-    requires detail::SpeaksOf<typename H::State, X...>
+  template <detail::JointSensor H, class... Kinds, class... X>
+    requires detail::NamesAll<typename H::State, X...>
   [[nodiscard]] Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> innovation(
       const JointGaussian<Kinds...>& belief, const H& sensor, const typename H::Measurement& z,
       BlockId<X>... ids) const;
@@ -171,9 +188,9 @@ private:
 /// R^-1 H_n: jacobian -N^-1 H_n^T R^-1 H_k, noise N^-1. That is an update with a new block of infinite
 /// variance, but for what z says beyond the block, which is dropped: nothing, where the sensor sees the block
 /// relative to the known ones. Where z does not determine the block the noise is NaN, and refused.
-template <LinearisedMeasurement H>
+template <detail::JointSensor H>
 struct Inverted;
-template <LinearisedMeasurement H>
+template <detail::JointSensor H>
 [[nodiscard]] Inverted<H> inverted(const H& sensor) {
   return {sensor};
 }
@@ -359,7 +376,7 @@ void carry_columns(Matrix<dynamic, dynamic, S>& jacobian, const State& x, const 
 
 }  // namespace detail
 
-template <LinearisedMeasurement H>
+template <detail::JointSensor H>
 struct Inverted {
   using Parts = detail::LastPart<typename H::State>;
   using State = typename Parts::Known;
@@ -436,8 +453,8 @@ bool JointExtended::lowers(detail::JointCovariance<S>& core, std::span<const det
   return (form == Form::standard && core.sound()) || core.stabilise(parts, root.lower().data(), r.data());
 }
 
-template <LinearisedProcess F, class... Kinds, class... X>
-  requires detail::SpeaksOf<typename F::State, X...>
+template <detail::JointProcess F, class... Kinds, class... X>
+  requires detail::NamesAllBehindControl<F, X...>
 Status JointExtended::predict(JointGaussian<Kinds...>& belief, const F& process, double dt,
                               const typename F::Control& control, BlockId<X>... ids) const {
   using State = typename F::State;
@@ -475,8 +492,8 @@ Status JointExtended::predict(JointGaussian<Kinds...>& belief, const F& process,
   return Status::accepted;
 }
 
-template <LinearisedMeasurement H, class... Kinds, class... X>
-  requires detail::SpeaksOf<typename H::State, X...>
+template <detail::JointSensor H, class... Kinds, class... X>
+  requires detail::NamesAll<typename H::State, X...>
 Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> JointExtended::innovation(
     const JointGaussian<Kinds...>& belief, const H& sensor, const typename H::Measurement& z,
     BlockId<X>... ids) const {
@@ -504,8 +521,8 @@ Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> JointExten
   return in;
 }
 
-template <LinearisedMeasurement H, class... Kinds, class... X>
-  requires detail::SpeaksOf<typename H::State, X...>
+template <detail::JointSensor H, class... Kinds, class... X>
+  requires detail::NamesAll<typename H::State, X...>
 Innovation<dof<typename H::Measurement>, ScalarOf<typename H::State>> JointExtended::update(
     JointGaussian<Kinds...>& belief, const H& sensor, const typename H::Measurement& z,
     BlockId<X>... ids) const {
@@ -650,7 +667,7 @@ Innovation<dynamic, typename JointGaussian<Kinds...>::Scalar> JointExtended::upd
 
 template <class S>
 template <LinearisedMeasurement H, class... Kinds, class... X>
-  requires detail::SpeaksOf<typename H::State, X...>
+  requires detail::NamesAll<typename H::State, X...>
 Status StackedMeasurement<S>::add(const JointGaussian<Kinds...>& belief, const H& sensor,
                                   const typename H::Measurement& z, BlockId<X>... ids) {
   if (!(belief.has(ids) && ...)) return Status::unknown_block;

@@ -139,6 +139,24 @@ template <Manifold X>
 template <class State, class... X>
 concept SpeaksOf = std::same_as<State, typename StateOfBlocks<X...>::type>;
 
+/// Ends in the sentence, which prints the model's State and what the named blocks make.
+template <class State, class Named>
+struct BlocksMakeState {
+  static_assert(
+      std::same_as<State, Named>,
+      "cairn: the blocks that a call ends with are together the model's State: one of that kind, or for a "
+      "Product one of each part in its order; a process's control stands before them. See "
+      "BlocksMakeState<the "
+      "State, what was named>");
+};
+/// False, after the sentence. For no block Product<> is printed.
+template <class State, class... X>
+inline constexpr bool explain_blocks =
+    (static_cast<void>(sizeof(BlocksMakeState<State, typename StateOfBlocks<X...>::type>)), false);
+/// What functions ask of the blocks they are given, not for asking whether a model may speak of them.
+template <class State, class... X>
+concept NamesAll = SpeaksOf<State, X...> || explain_blocks<State, X...>;
+
 /// Where each block's numbers begin in a step of their common state.
 template <class... X>
 inline constexpr std::array<int, sizeof...(X)> block_offsets = [] {
@@ -284,7 +302,7 @@ public:
   /// A block that follows from known ones, with its correlations: P_new,: = G P_known,: and
   /// P_new,new = G P_known,known G^T + Q for G the model's jacobian and Q its noise. O(n d^2).
   template <InverseModel G, Manifold... X>
-    requires(has_kind<typename G::New> && (has_kind<X> && ...) && detail::SpeaksOf<typename G::State, X...>)
+    requires(has_kind<typename G::New> && (has_kind<X> && ...) && detail::NamesAll<typename G::State, X...>)
   AddedBlock<typename G::New> augment(const G& model, const typename G::Measurement& z, BlockId<X>... ids) {
     using New = typename G::New;
     using Named = detail::StateOfBlocks<X...>;

@@ -32,7 +32,7 @@ struct Kalman {
   double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
 
   /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite.
-  template <class F, class U = typename F::Control>
+  template <class F, class U = detail::ControlOf<F>>
     requires(LinearProcess<F> || detail::explain_process<F> || detail::explain_linear<F, ProcessModel<F>>)
   Status predict(Gaussian<typename F::State>& belief, const F& process, double dt,
                  const U& control = detail::no_control<U>()) const {

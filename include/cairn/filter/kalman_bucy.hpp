@@ -63,7 +63,7 @@ struct KalmanBucy {
   int most_parts = 100000;  ///< of one call, those that were too long included; >= 1
 
   /// Moves the belief by dt without measurement.
-  template <class F, class U = typename F::Control>
+  template <class F, class U = detail::ControlOf<F>>
     requires(ContinuousProcess<F> || detail::explain_sizes<F>)
   Status predict(Gaussian<typename F::State>& belief, const F& process, double dt,
                  const U& control = detail::no_control<U>()) const {
@@ -85,7 +85,7 @@ struct KalmanBucy {
   }
 
   /// Moves the belief by dt while the sensor reports z, held constant; sensor.noise() is a spectral density.
-  template <class F, class H, class U = typename F::Control, class V = typename H::Measurement>
+  template <class F, class H, class U = detail::ControlOf<F>, class V = typename H::Measurement>
     requires(ContinuousProcess<F> || detail::explain_sizes<F>) &&
             (LinearisedMeasurement<H> || detail::explain_sensor<H>)
   Status filter(Gaussian<typename F::State>& belief, const F& process, const H& sensor, const V& z, double dt,
@@ -116,7 +116,7 @@ struct KalmanBucy {
 
   /// The same in information form: point and Y move together, y is zero throughout. Y must be positive
   /// definite for the estimate to move.
-  template <class F, class H, class U = typename F::Control, class V = typename H::Measurement>
+  template <class F, class H, class U = detail::ControlOf<F>, class V = typename H::Measurement>
     requires(ContinuousProcess<F> || detail::explain_sizes<F>) &&
             (LinearisedMeasurement<H> || detail::explain_sensor<H>)
   Status filter(InformationBelief<typename F::State>& belief, const F& process, const H& sensor, const V& z,

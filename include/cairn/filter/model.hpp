@@ -63,6 +63,19 @@ struct NoControl {};
 
 namespace detail {
 
+/// The type of a process's control; none where it does not say, so that a sentence can.
+template <class F>
+struct ControlOfProcess {
+  using type = NoControl;
+};
+template <class F>
+  requires requires { typename F::Control; }
+struct ControlOfProcess<F> {
+  using type = typename F::Control;
+};
+template <class F>
+using ControlOf = typename ControlOfProcess<F>::type;
+
 /// The control where none is given: there is none, and a process that has one must be told it.
 template <class U>
 [[nodiscard]] constexpr U no_control() {

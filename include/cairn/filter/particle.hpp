@@ -277,7 +277,7 @@ struct ParticleFilter {
       0.5;  ///< resample when the effective number falls below this share; 0 never, 1 always
 
   /// Moves every particle and draws its noise.
-  template <class F, class U = typename F::Control>
+  template <class F, class U = detail::ControlOf<F>>
     requires(ProcessModel<F> || detail::explain_process<F>)
   Status predict(Particles<typename F::State>& belief, const F& process, double dt, Random& random,
                  const U& control = detail::no_control<U>()) const {

@@ -120,7 +120,7 @@ struct RaoBlackwell {
   ParticleFilter particles{};  ///< when and how to resample
 
   /// Moves every sampled state and draws its noise; the parts stay.
-  template <class F, Manifold Part, class U = typename F::Control>
+  template <class F, Manifold Part, class U = detail::ControlOf<F>>
     requires(ProcessModel<F> || detail::explain_process<F>)
   Status predict(ConditionalParticles<typename F::State, Part>& belief, const F& process, double dt,
                  Random& random, const U& control = detail::no_control<U>()) const {

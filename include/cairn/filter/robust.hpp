@@ -73,7 +73,7 @@ struct Robust {
   using BeliefOf = cairn::BeliefOf<Filter, X>;
 
   /// That of the filter.
-  template <Belief B, class F, class U = typename F::Control>
+  template <Belief B, class F, class U = detail::ControlOf<F>>
     requires(ProcessModel<F> || detail::explain_process<F>)
   Status predict(B& belief, const F& process, double dt, const U& control = detail::no_control<U>()) const {
     return filter.predict(belief, process, dt, control);
@@ -178,7 +178,7 @@ struct Huber {
   using BeliefOf = cairn::BeliefOf<Filter, X>;
 
   /// That of the filter.
-  template <Belief B, class F, class U = typename F::Control>
+  template <Belief B, class F, class U = detail::ControlOf<F>>
     requires(ProcessModel<F> || detail::explain_process<F>)
   Status predict(B& belief, const F& process, double dt, const U& control = detail::no_control<U>()) const {
     return filter.predict(belief, process, dt, control);
@@ -203,7 +203,7 @@ struct StudentT {
   using BeliefOf = cairn::BeliefOf<Filter, X>;
 
   /// That of the filter.
-  template <Belief B, class F, class U = typename F::Control>
+  template <Belief B, class F, class U = detail::ControlOf<F>>
     requires(ProcessModel<F> || detail::explain_process<F>)
   Status predict(B& belief, const F& process, double dt, const U& control = detail::no_control<U>()) const {
     return filter.predict(belief, process, dt, control);

@@ -209,9 +209,10 @@ public:
 
   /// As the filter's own; refused as well where the belief before has no covariance, which a filter may not
   /// see before an update. One that rounding has left indefinite here is made of squares.
-  template <class F, class U = typename F::Control>
+  template <class F, class U = detail::ControlOf<F>>
     requires(ProcessModel<F> || detail::explain_process<F>)
   Status predict(const F& process, double dt, const U& control = detail::no_control<U>()) {
+    static_assert(detail::demand_one_belief<Filter, Belief, F>());
     const Belief before = belief_;
     const Status status = filter_.predict(belief_, process, dt, control);
     if (status != Status::accepted) return status;

@@ -107,7 +107,7 @@ struct SquareRoot {
   template <Manifold X>
   using BeliefOf = SquareRootGaussian<X>;
 
-  template <class F, class U = typename F::Control>
+  template <class F, class U = detail::ControlOf<F>>
     requires(LinearisedProcess<F> || detail::explain_process<F> ||
              detail::explain_jacobian<F, ProcessModel<F>>)
   Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, double dt,
@@ -175,7 +175,7 @@ struct SquareRootUnscented {
   template <Manifold X>
   using BeliefOf = SquareRootGaussian<X>;
 
-  template <class F, class U = typename F::Control>
+  template <class F, class U = detail::ControlOf<F>>
     requires(ProcessModel<F> || detail::explain_process<F>)
   Status predict(SquareRootGaussian<typename F::State>& belief, const F& process, double dt,
                  const U& control = detail::no_control<U>()) const {

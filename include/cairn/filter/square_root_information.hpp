@@ -101,7 +101,7 @@ struct SquareRootInformationFilter {
 
   /// Moves the belief by one step of dt, and the point of linearisation to the estimate before, where there
   /// is one. Refused: a singular F. O(n^3).
-  template <class F, class U = typename F::Control>
+  template <class F, class U = detail::ControlOf<F>>
     requires(LinearisedProcess<F> || detail::explain_process<F> ||
              detail::explain_jacobian<F, ProcessModel<F>>)
   Status predict(SquareRootInformation<typename F::State>& belief, const F& process, double dt,

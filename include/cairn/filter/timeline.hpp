@@ -48,6 +48,7 @@ public:
   using State = typename F::State;
   using Control = typename F::Control;
   using Belief = BeliefOf<Filter, State>;
+  static_assert(detail::demand_one_belief<Filter, Belief, F>());
 
   /// The belief `prior` at `time` [s], `control` from then on; events may come up to `horizon` [s] late.
   Timeline(const Filter& filter, const F& process, const Belief& prior, double time, const Control& control,

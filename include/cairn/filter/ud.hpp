@@ -65,7 +65,7 @@ struct UDFilter {
   template <Manifold X>
   using BeliefOf = UDGaussian<X>;
 
-  template <class F, class U = typename F::Control>
+  template <class F, class U = detail::ControlOf<F>>
     requires(LinearisedProcess<F> || detail::explain_process<F> ||
              detail::explain_jacobian<F, ProcessModel<F>>)
   Status predict(UDGaussian<typename F::State>& belief, const F& process, double dt,

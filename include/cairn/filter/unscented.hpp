@@ -122,7 +122,7 @@ struct Unscented {
   double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
 
   /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite, a P that is no covariance.
-  template <class F, class U = typename F::Control>
+  template <class F, class U = detail::ControlOf<F>>
     requires(ProcessModel<F> || detail::explain_process<F>)
   Status predict(Gaussian<typename F::State>& belief, const F& process, double dt,
                  const U& control = detail::no_control<U>()) const {

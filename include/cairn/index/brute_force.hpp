@@ -6,6 +6,7 @@
 #pragma once
 
 #include <algorithm>
+#include <concepts>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -66,6 +67,8 @@ public:
   [[nodiscard]] std::vector<Hit> nearest(const Query& query, std::size_t k, Budget = {}) const {
     return detail::k_nearest_of<Real>(k, size(), metric_, [&](auto& collector) { search(query, collector); });
   }
+  template <QueryPoint Query>
+  void nearest(const Query&, std::floating_point auto) const = delete;  ///< a radius? within(query, radius)
   /// Writes the nearest points, nearest first, as many as `found` has room for; returns how many.
   template <QueryPoint Query>
   std::size_t nearest(const Query& query, std::span<Hit> found) const {

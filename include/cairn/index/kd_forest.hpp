@@ -25,6 +25,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -115,6 +116,8 @@ public:
     return detail::k_nearest_of<float>(
         k, size(), L2{}, [&](auto& collector) { search(query, collector, {.budget = budget}); });
   }
+  template <QueryPoint Query>
+  void nearest(const Query&, std::floating_point auto) const = delete;  ///< a radius? within(query, radius)
   /// Writes the nearest points, nearest first, as many as `found` has room for; returns how many.
   template <QueryPoint Query>
   std::size_t nearest(const Query& query, std::span<Hit> found) const {

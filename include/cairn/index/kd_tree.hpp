@@ -23,6 +23,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -134,6 +135,8 @@ public:
     return detail::k_nearest_of<Real>(k, size(), metric_,
                                       [&](auto& collector) { search(query, collector, {.budget = budget}); });
   }
+  template <QueryPoint Query>
+  void nearest(const Query&, std::floating_point auto) const = delete;  ///< a radius? within(query, radius)
 
   /// Writes the nearest points, nearest first, as many as `found` has room for; returns how many.
   template <QueryPoint Query>

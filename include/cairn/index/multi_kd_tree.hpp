@@ -29,6 +29,7 @@
 #pragma once
 
 #include <algorithm>
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -183,6 +184,8 @@ public:
     return detail::k_nearest_of<Real>(k, size(), metric_,
                                       [&](auto& collector) { search(query, collector, {.budget = budget}); });
   }
+  template <QueryPoint Query>
+  void nearest(const Query&, std::floating_point auto) const = delete;  ///< a radius? within(query, radius)
 
   /// Writes the nearest points, nearest first, as many as `found` has room for; returns how many.
   template <QueryPoint Query>

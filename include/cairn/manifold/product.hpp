@@ -37,7 +37,7 @@ class Product {
 public:
   /// Every part at its origin.
   Product() : parts_(detail::origin<Parts>()...) {}
-  explicit Product(const Parts&... parts)
+  explicit(sizeof...(Parts) == 1) Product(const Parts&... parts)
     requires(sizeof...(Parts) > 0)
       : parts_(parts...) {}
 

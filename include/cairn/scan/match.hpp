@@ -289,6 +289,19 @@ enum class MatchStatus {
   few_inliers,    ///< less than the share asked for
 };
 
+/// The status as a sentence for a log.
+[[nodiscard]] constexpr const char* explain(MatchStatus status) noexcept {
+  switch (status) {
+    case MatchStatus::converged:
+      return "converged";
+    case MatchStatus::not_converged:
+      return "not converged: the best pose of all steps is given";
+    case MatchStatus::few_inliers:
+      return "few inliers: too few points of the scan lie where the map has obstacles";
+  }
+  return "unknown status";
+}
+
 /// Options of match().
 struct MatchOptions {
   EndPointModel model{};

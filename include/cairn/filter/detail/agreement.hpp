@@ -149,6 +149,12 @@ struct ProcessHasState {
                 "...; propagate(x, u, dt) and noise(x, u, dt). This one has no State");
 };
 template <class Model>
+struct ProcessHasControl {
+  static_assert(!sizeof(Model),
+                "cairn: a process says what steers it: using Control = cairn::NoControl; where nothing does, "
+                "and propagate(x, u, dt) and noise(x, u, dt) take one all the same");
+};
+template <class Model>
 struct SensorHasState {
   static_assert(
       !sizeof(Model),

@@ -180,6 +180,17 @@ consteval void look_at_state() {
     static_cast<void>(sizeof(StateIsManifold<X>));
 }
 
+/// False, after the sentence: of what is asked for as a state and is none.
+template <class X>
+inline constexpr bool explain_state = [] {
+  look_at_state<X, true>();
+  return false;
+}();
+
+/// A state, or the sentence: for what takes one, not for asking.
+template <class X>
+concept StateAsked = Manifold<X> || explain_state<X>;
+
 /// Which part of a model is asked for.
 enum class Role { any, process, sensor };
 
@@ -190,6 +201,8 @@ inline constexpr bool explain_as = [] {
   constexpr bool process = role == Role::process, sensor = role == Role::sensor;
   if constexpr (process && !requires { typename Model::State; })
     static_cast<void>(sizeof(ProcessHasState<Model>));
+  else if constexpr (process && !requires { typename Model::Control; })
+    static_cast<void>(sizeof(ProcessHasControl<Model>));
   else if constexpr (sensor && !requires { typename Model::State; })
     static_cast<void>(sizeof(SensorHasState<Model>));
   else if constexpr (sensor && !requires { typename Model::Measurement; })

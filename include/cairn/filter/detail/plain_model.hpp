@@ -103,7 +103,7 @@ template <class Model>
 inline constexpr bool side_by_side = requires { requires Model::side_by_side; };
 
 /// A process with the control it is given, for a state whose steps have `size` numbers.
-template <class F, class U = typename F::Control>
+template <class F, class U = detail::ControlOf<F>>
 class PlainProcess {
 public:
   using State = typename F::State;
