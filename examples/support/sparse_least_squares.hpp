@@ -59,7 +59,7 @@ private:
 struct LevenbergOptions {
   int most_iterations = 200;
   double most_damping = 1e12;
-  double least_gain = 1e-9;  ///< share of the cost that a step has to take off, or it was the last
+  double least_gain = 1e-9;  ///< share of the cost that a step has to take off or promise, or it was the last
 };
 
 template <class Estimate>
@@ -67,7 +67,7 @@ struct LeastSquares {
   Estimate at;
   double cost = 0;
   int iterations = 0;
-  bool converged = false;  ///< the last step gained little; else the cost falls no more, or not yet
+  bool converged = false;  ///< the last step gained little, or promised little; else the cost still falls
 };
 
 /// Begins at an estimate and takes only steps that lower the cost, which may be infinite or no number where
@@ -86,9 +86,14 @@ template <class Estimate, class EquationsAt, class Moved>
   for (; best.iterations < options.most_iterations && !best.converged && damping < options.most_damping;
        ++best.iterations) {
     root.factorize(damped(h, damping));
-    Estimate next = moved(std::as_const(best.at), Eigen::VectorXd(root.solve(-equations.gradient())));
+    const Eigen::VectorXd step = root.solve(-equations.gradient());
+    Estimate next = moved(std::as_const(best.at), step);
     NormalEquations there = equations_at(next);
     if (!(there.cost() < equations.cost())) {
+      // What the equations promised; with more damping they promise less.
+      const double promised =
+          0.5 * (damping * step.dot(h.diagonal().cwiseProduct(step)) - step.dot(equations.gradient()));
+      best.converged = root.info() == Eigen::Success && promised <= options.least_gain * equations.cost();
       damping *= 10;
       continue;
     }

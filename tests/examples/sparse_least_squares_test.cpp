@@ -165,6 +165,32 @@ TEST_SUITE("examples/sparse_least_squares") {
     }
   }
 
+  TEST_CASE("least squares: a start that is the optimum is left as soon as no step promises anything") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    for (int repeat = 0; repeat < 20; ++repeat) {
+      const Chain chain(30, random);
+      const Eigen::VectorXd is = chain.dense().colPivHouseholderQr().solve(chain.offsets());
+      const auto found = example::levenberg(
+          Eigen::VectorXd(is), [&](const Eigen::VectorXd& x) { return chain.equations_at(x); }, added);
+      CHECK(found.converged);
+      CHECK(found.iterations == 1);
+      CHECK((found.at - is).norm() < 1e-8 * (1 + is.norm()));
+    }
+    // Where nothing is left of the cost, no share of it is.
+    const auto exact = [](const Eigen::VectorXd& x) {
+      example::NormalEquations equations(1);
+      equations.add_cost(0.5 * x(0) * x(0));
+      equations.add_block(0, 0, Matrix<1>(Matrix<1>::Ones()));
+      equations.add_gradient(0, Vector<1>(Vector<1>(x(0))));
+      return equations;
+    };
+    const auto found = example::levenberg(Eigen::VectorXd(Vector<1>(0.0)), exact, added);
+    CHECK(found.converged);
+    CHECK(found.iterations == 1);
+  }
+
   TEST_CASE("least squares: from a start where whole steps lead astray it ends where every slope is zero") {
     Ranges ranges;
     const Eigen::VectorXd is = Eigen::Vector4d(3, 4, 7, 5);

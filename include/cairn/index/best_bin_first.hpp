@@ -128,15 +128,18 @@ private:
 
   void push(const Cell& cell) {
     queue_.push_back(cell);
-    std::push_heap(queue_.begin(), queue_.end(), farther);
+    std::push_heap(queue_.begin(), queue_.end(), Farther{});
   }
   Cell pop() {
-    std::pop_heap(queue_.begin(), queue_.end(), farther);
+    std::pop_heap(queue_.begin(), queue_.end(), Farther{});
     const Cell cell = queue_.back();
     queue_.pop_back();
     return cell;
   }
-  static bool farther(const Cell& a, const Cell& b) noexcept { return a.bound > b.bound; }
+  /// A type: a function would be called by its pointer.
+  struct Farther {
+    bool operator()(const Cell& a, const Cell& b) const noexcept { return a.bound > b.bound; }
+  };
 
   /// From a cell down to the leaf on the query's side of every split, whose number is returned; the other
   /// sides are queued.

@@ -36,7 +36,7 @@ public:
   [[nodiscard]] bool empty() const noexcept { return hits_.empty(); }
   [[nodiscard]] const Hit& front() const noexcept { return hits_.front(); }
   [[nodiscard]] Hit pop() {
-    std::pop_heap(hits_.begin(), hits_.end(), farther);
+    std::pop_heap(hits_.begin(), hits_.end(), Farther{});
     const Hit hit = hits_.back();
     hits_.pop_back();
     return hit;
@@ -46,11 +46,13 @@ public:
   [[nodiscard]] Real limit() const noexcept { return std::numeric_limits<Real>::infinity(); }
   void offer(PointId id, Real reduced) {
     hits_.push_back({id, reduced});
-    std::push_heap(hits_.begin(), hits_.end(), farther);
+    std::push_heap(hits_.begin(), hits_.end(), Farther{});
   }
 
 private:
-  static bool farther(const Hit& a, const Hit& b) noexcept { return nearer(b, a); }
+  struct Farther {
+    bool operator()(const Hit& a, const Hit& b) const noexcept { return nearer(b, a); }
+  };
   std::vector<Hit> hits_;
 };
 
@@ -98,10 +100,12 @@ private:
     std::vector<Offset> offsets;
   };
 
-  static bool farther_cell(const Cell& a, const Cell& b) noexcept { return a.bound > b.bound; }
+  struct FartherCell {
+    bool operator()(const Cell& a, const Cell& b) const noexcept { return a.bound > b.bound; }
+  };
 
   void open_nearest_cell() {
-    std::pop_heap(cells_.begin(), cells_.end(), farther_cell);
+    std::pop_heap(cells_.begin(), cells_.end(), FartherCell{});
     Cell cell = std::move(cells_.back());
     cells_.pop_back();
     for (;; ++cell.depth) {
@@ -131,7 +135,7 @@ private:
     else
       at->offset = offset;
     cells_.push_back(std::move(far));
-    std::push_heap(cells_.begin(), cells_.end(), farther_cell);
+    std::push_heap(cells_.begin(), cells_.end(), FartherCell{});
   }
 
   const Tree* tree_;

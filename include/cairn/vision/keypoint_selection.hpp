@@ -30,12 +30,25 @@ namespace cairn { inline namespace CAIRN_ABI {
   return a.scale < b.scale;
 }
 
+namespace detail {
+
+/// stronger() as a sort can inline it, which a pointer to a function it cannot.
+inline void sort_by_strength(std::vector<Keypoint>& keypoints) {
+  std::sort(keypoints.begin(), keypoints.end(),
+            [](const Keypoint& a, const Keypoint& b) { return stronger(a, b); });
+}
+
+}  // namespace detail
+
 /// Sorts by strength and keeps the first `count`. O(n log n).
 inline void keep_strongest(std::vector<Keypoint>& keypoints, std::size_t count) {
-  const std::size_t kept = std::min(count, keypoints.size());
-  const auto end = keypoints.begin() + static_cast<std::ptrdiff_t>(kept);
-  std::partial_sort(keypoints.begin(), end, keypoints.end(), stronger);
-  keypoints.erase(end, keypoints.end());
+  if (count < keypoints.size()) {
+    const auto end = keypoints.begin() + static_cast<std::ptrdiff_t>(count);
+    std::nth_element(keypoints.begin(), end, keypoints.end(),
+                     [](const Keypoint& a, const Keypoint& b) { return stronger(a, b); });
+    keypoints.erase(end, keypoints.end());
+  }
+  detail::sort_by_strength(keypoints);
 }
 
 /// As keep_strongest, but each of columns x rows equal cells of the width x height image first gets an equal
@@ -46,7 +59,7 @@ inline void keep_strongest_spread(std::vector<Keypoint>& keypoints, std::size_t 
   CAIRN_EXPECTS(width > 0 && height > 0 && columns > 0 && rows > 0, "a grid has at least one cell");
   const auto grid = static_cast<std::uint64_t>(columns) * static_cast<std::uint64_t>(rows);
   if (grid > count) return keep_strongest(keypoints, count);
-  std::sort(keypoints.begin(), keypoints.end(), stronger);
+  detail::sort_by_strength(keypoints);
   if (keypoints.size() <= count) return;
   const auto cells = static_cast<std::size_t>(grid);
   const std::size_t share = count / cells;
@@ -67,7 +80,7 @@ inline void keep_strongest_spread(std::vector<Keypoint>& keypoints, std::size_t 
   }
   const std::size_t missing = std::min(count - kept.size(), rest.size());
   kept.insert(kept.end(), rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(missing));
-  std::sort(kept.begin(), kept.end(), stronger);
+  detail::sort_by_strength(kept);
   keypoints.swap(kept);
 }
 
