@@ -185,18 +185,21 @@ void Pipeline::work_on(const StereoFrame& frame, const FramePoints& points, Fram
   left_ = &points.left;
   image_ = frame.left;
   timed(result, Stage::total, [&] {
+    const std::optional<std::string> torn = of_two_moments(frame);
     timed(result, Stage::stereo, [&] {
       const std::vector<PointPair> pairs =
           points.matched_by == match_stereo_ ? points.pairs : pairs_of(frame, points);
       constexpr std::size_t beginning = 3;  // frames; one can show nothing
-      if (record_.frames.size() <= beginning)
+      if (!torn && record_.frames.size() <= beginning)
         if (const auto why = mistaken_sides(rig_, options_.stereo, frame, points, pairs, options_.threads))
           cairn::raise(frame.name + ": " + *why);
       find_local_landmarks(pairs);
     });
     motion_.predict(seconds_between(time_.value_or(frame.time), frame.time));
     time_ = frame.time;
-    if (map_.empty())
+    if (torn)
+      lose(frame, *torn, result);
+    else if (map_.empty())
       begin(frame, result);
     else
       follow(frame, result);
@@ -217,6 +220,18 @@ void Pipeline::work_on(const StereoFrame& frame, const FramePoints& points, Fram
     result.T_world_reference = map_.keyframe_pose(result.reference).value_or(cairn::SE3());
   }
   ++step_;
+}
+
+/// What says that the two images are not of one moment: one of them, and not the other, is that of the frame
+/// before to the last bit. A camera that hangs is no other way to be seen: its points lie where the map has
+/// them, and by what the other image shows they move in depth.
+std::optional<std::string> Pipeline::of_two_moments(const StereoFrame& frame) {
+  const bool left_again = frame.left == last_left_, right_again = frame.right == last_right_;
+  if (!left_again) last_left_ = frame.left;
+  if (!right_again) last_right_ = frame.right;
+  if (left_again == right_again) return std::nullopt;
+  return std::string("the ") + (left_again ? "left" : "right") +
+         " image is that of the frame before, and the other is not";
 }
 
 /// The first frame that shows enough is where the world begins.

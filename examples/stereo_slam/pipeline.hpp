@@ -179,6 +179,7 @@ private:
   [[nodiscard]] std::optional<Located> locate(std::vector<Match>& matches);
   [[nodiscard]] std::vector<Match> within_reach(const std::vector<Match>& matches);
   [[nodiscard]] bool believes(const cairn::MapLocation& here);
+  [[nodiscard]] std::optional<std::string> of_two_moments(const StereoFrame& frame);
   void begin(const StereoFrame& frame, FrameRecord& result);
   void choose_calibration();
   void watch_rig();
@@ -222,6 +223,7 @@ private:
   std::optional<FrontEnd> front_end_;      // made for the first frame that comes without points
   const cairn::Features* left_ = nullptr;  // of the frame that is worked on
   cairn::ImageView image_;                 // its left image
+  cairn::Image last_left_, last_right_;    // of the frame before
   std::shared_ptr<const StereoMatcher> match_stereo_;
   cairn::Triangulator triangulate_;
   SelfCalibration calibration_;

@@ -298,6 +298,36 @@ TEST_SUITE("pipeline") {
     CHECK(record.notes[0].find("lost") != std::string::npos);
   }
 
+  TEST_CASE(
+      "pipeline: pairs of which one camera hangs are lost and said, and the drive goes on beside them") {
+    using Side = cairn::Image StereoFrame::*;
+    for (const Side side : {&StereoFrame::left, &StereoFrame::right}) {
+      std::vector<StereoFrame> frames = drive();
+      for (std::size_t i = 6; i < 10; ++i) frames[i].*side = frames[5].*side;
+      const RunRecord record = run(frames, options());
+      for (std::size_t i = 0; i < frames.size(); ++i) {
+        CAPTURE(i);
+        const bool hangs = i >= 6 && i < 10;
+        CHECK(record.frames[i].tracked == !hangs);
+        CHECK(record.frames[i].bridged == hangs);
+        const auto error = cairn::local(*record.frames[i].truth, record.frames[i].T_world_camera);
+        CHECK(error.head<3>().norm() < 0.02);
+      }
+      REQUIRE(record.notes.size() == 4);
+      const std::string said = side == &StereoFrame::left ? "the left image is that of the frame before"
+                                                          : "the right image is that of the frame before";
+      CHECK(record.notes[0].find(said) != std::string::npos);
+    }
+  }
+
+  TEST_CASE("pipeline: a pair that comes twice is where it was") {
+    std::vector<StereoFrame> frames = drive();
+    frames.insert(frames.begin() + 6, frames[5]);
+    const RunRecord record = run(frames, options());
+    CHECK(record.notes.empty());
+    CHECK(record.frames[6].tracked);
+  }
+
   TEST_CASE("pipeline: the motion carries the camera over frames that show nothing, by each of the filters") {
     std::vector<StereoFrame> frames = drive();
     for (std::size_t i = 5; i < 10; ++i) frames[i] = black(frames[i]);
