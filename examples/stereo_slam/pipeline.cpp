@@ -14,6 +14,7 @@
 #include <cairn/core/statistics.hpp>
 #include <cairn/io/text.hpp>
 
+#include "levelled_rig.hpp"
 #include "lost_stretch.hpp"
 #include "mistaken_sides.hpp"
 #include "stopwatch.hpp"
@@ -119,7 +120,7 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options, 
   lost_ = true;
   record_.calibration.on = map_.rig_correction().has_value();
   record_.calibration.why = "as the map has it";
-  if (map_.rig_correction()) look_through(map_.rig());
+  look_through(map_.rig());
   if (options_.calibrate == Calibration::drifting) follow_rig(as_asked(options_));
 }
 
@@ -187,8 +188,9 @@ void Pipeline::work_on(const StereoFrame& frame, const FramePoints& points, Fram
   timed(result, Stage::total, [&] {
     const std::optional<std::string> torn = of_two_moments(frame);
     timed(result, Stage::stereo, [&] {
-      const std::vector<PointPair> pairs =
+      std::vector<PointPair> pairs =
           points.matched_by == match_stereo_ ? points.pairs : pairs_of(frame, points);
+      if (map_.empty() && !torn && level_rig(frame, points, pairs)) pairs = pairs_of(frame, points);
       constexpr std::size_t beginning = 3;  // frames; one can show nothing
       if (!torn && record_.frames.size() <= beginning)
         if (const auto why = mistaken_sides(rig_, options_.stereo, frame, points, pairs, options_.threads))
@@ -220,6 +222,27 @@ void Pipeline::work_on(const StereoFrame& frame, const FramePoints& points, Fram
     result.T_world_reference = map_.keyframe_pose(result.reference).value_or(cairn::SE3());
   }
   ++step_;
+}
+
+/// Takes the right camera to be pitched as its rows are; false where they are as the rig says.
+bool Pipeline::level_rig(const StereoFrame& frame, const FramePoints& points,
+                         std::span<const PointPair> pairs) {
+  const auto level = levelled(rig_, options_.stereo, frame, points, pairs, options_.threads);
+  if (!level) return false;
+  const auto rounded = [](double value) { return cairn::shortest(std::round(1e3 * value) / 1e3); };
+  const std::string seen =
+      "the rows of the right image are " + rounded(level->rows) + " pixels from where the rig has them";
+  if (options_.calibrate == Calibration::off)
+    cairn::raise(frame.name + ": " + seen +
+                 ": expected a rig that is calibrated as these images are (calibrate_stereo makes one), or "
+                 "--calibrate auto, which corrects it");
+  record_.notes.push_back(frame.name + ": " + seen + "; its camera is taken to be turned by " +
+                          rounded(level->angle * 180 / std::numbers::pi) + " degrees about its x axis");
+  levelled_ = true;
+  look_through(level->rig);
+  map_ = cairn::KeyframeMap(rig_, map_options(options_));
+  calibration_ = SelfCalibration(rig_, options_.calibration);
+  return true;
 }
 
 /// What says that the two images are not of one moment: one of them, and not the other, is that of the frame
@@ -257,8 +280,8 @@ void Pipeline::choose_calibration() {
   if (options_.calibrate == Calibration::drifting) return follow_rig(record.why);
   if (options_.calibrate == Calibration::automatic) {
     const VerticalDisparity seen = disparity_of_locals();
-    record.on = seen.shows();
-    record.why = in_words(seen);
+    record.on = seen.shows() || levelled_;
+    record.why = in_words(seen) + (levelled_ ? ", and the rig had to be levelled" : "");
   }
   if (!record.on) return;
   cairn::KeyframeMapOptions with_rig = map_options(options_);

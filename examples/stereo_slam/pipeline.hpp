@@ -180,6 +180,7 @@ private:
   [[nodiscard]] std::vector<Match> within_reach(const std::vector<Match>& matches);
   [[nodiscard]] bool believes(const cairn::MapLocation& here);
   [[nodiscard]] std::optional<std::string> of_two_moments(const StereoFrame& frame);
+  bool level_rig(const StereoFrame& frame, const FramePoints& points, std::span<const PointPair> pairs);
   void begin(const StereoFrame& frame, FrameRecord& result);
   void choose_calibration();
   void watch_rig();
@@ -226,6 +227,7 @@ private:
   cairn::Image last_left_, last_right_;    // of the frame before
   std::shared_ptr<const StereoMatcher> match_stereo_;
   cairn::Triangulator triangulate_;
+  bool levelled_ = false;  // the rig is not as it was given
   SelfCalibration calibration_;
   std::unique_ptr<LandmarkStore> store_;
   Landmarks landmarks_;

@@ -111,7 +111,8 @@ SavedMap load_map(const std::filesystem::path& path) {
 }
 
 void expect_same_rig(const cairn::StereoRig& of_map, const cairn::StereoRig& rig, const std::string& name) {
-  const cairn::Vector<6> apart = cairn::local(of_map.T_left_right, rig.T_left_right);
+  cairn::Vector<6> apart = cairn::local(of_map.T_left_right, rig.T_left_right);
+  apart(3) = 0;  // the run that made the map may have levelled it (levelled_rig.hpp)
   if (same(of_map.left, rig.left) && same(of_map.right, rig.right) && apart.norm() < 1e-9) return;
   cairn::raise(name + ": this map was made with another rig than these images (" +
                std::to_string(of_map.left.width()) + " x " + std::to_string(of_map.left.height()) +
