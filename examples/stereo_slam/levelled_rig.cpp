@@ -30,7 +30,9 @@ cairn::StereoRig pitched(const cairn::StereoRig& rig, double angle) {
 std::optional<LevelledRig> levelled(const cairn::StereoRig& rig, const StereoMatcherOptions& options,
                                     const StereoFrame& frame, const FramePoints& points,
                                     std::span<const PointPair> pairs, unsigned threads) {
-  if (!options.refine) return std::nullopt;
+  // Of level rigs 69 to 84 in a hundred agree; of three whose rows are 2.3 to 2.9 pixels apart 40 to 60.
+  const std::size_t before = agreeing_pixels(pairs).size();
+  if (!options.refine || 3 * before >= 2 * pairs.size()) return std::nullopt;
   const auto found_by = [&](const cairn::StereoRig& by, double band) {
     StereoMatcherOptions within = options;
     within.band = band;
@@ -51,7 +53,7 @@ std::optional<LevelledRig> levelled(const cairn::StereoRig& rig, const StereoMat
   }
   const LevelledRig result{pitched(rig, angle), angle, rows};
   constexpr std::size_t enough = 40;
-  const std::size_t more = found_by(result.rig, options.band).size(), before = agreeing_pixels(pairs).size();
+  const std::size_t more = found_by(result.rig, options.band).size();
   if (more < enough || 2 * more < 3 * before) return std::nullopt;
   return result;
 }
