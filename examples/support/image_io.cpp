@@ -4,18 +4,12 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
-#include <memory>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <png.h>
-#ifdef EXAMPLES_HAVE_DEFLATE
-#include <libdeflate.h>
-#endif
 #ifdef EXAMPLES_HAVE_JPEG
 #include <turbojpeg.h>
 #endif
@@ -28,7 +22,6 @@ namespace example {
 namespace {
 
 constexpr std::uint64_t most_pixels = 1U << 28U;
-constexpr std::string_view png_signature("\x89PNG\r\n\x1a\n", 8);
 
 // libpng's control block, released on every way out.
 struct Png {
@@ -60,101 +53,6 @@ cairn::Image decode_png(const std::filesystem::path& path, std::string_view byte
     refuse(path, std::string("damaged PNG (") + png.image.message + ")");
   return image;
 }
-
-#ifdef EXAMPLES_HAVE_DEFLATE
-
-std::uint32_t big_endian(std::string_view four) {
-  std::uint32_t value = 0;
-  for (const char byte : four) value = value << 8U | static_cast<unsigned char>(byte);
-  return value;
-}
-
-struct Chunk {
-  std::string_view type, data;
-};
-
-// The next chunk of a PNG, taken off the bytes; none where it is torn or not what its checksum says.
-std::optional<Chunk> take_chunk(std::string_view& bytes) {
-  constexpr std::size_t frame =
-      12;  // length and type before the data, the checksum of type and data after them
-  if (bytes.size() < frame) return std::nullopt;
-  const std::size_t size = big_endian(bytes.substr(0, 4));
-  if (size > bytes.size() - frame) return std::nullopt;
-  const std::string_view summed = bytes.substr(4, 4 + size);
-  if (libdeflate_crc32(0, summed.data(), summed.size()) != big_endian(bytes.substr(8 + size, 4)))
-    return std::nullopt;
-  bytes.remove_prefix(frame + size);
-  return Chunk{summed.substr(0, 4), summed.substr(4)};
-}
-
-// The pixels of a row whose coded bytes stand behind the number of their filter (PNG specification, clause
-// 9); `above` is the row over it. False where there is no such filter.
-bool unfilter(const std::uint8_t* coded, const std::uint8_t* above, std::uint8_t* row, std::size_t width) {
-  const std::uint8_t filter = *coded++;
-  std::uint8_t left = 0, corner = 0;  // of the row, and over that
-  const auto each = [&](auto guess) {
-    for (std::size_t x = 0; x < width; ++x) {
-      left = row[x] = static_cast<std::uint8_t>(coded[x] + guess(above[x]));
-      corner = above[x];
-    }
-    return true;
-  };
-  switch (filter) {
-    case 0:
-      return each([](int) { return 0; });
-    case 1:
-      return each([&](int) { return left; });
-    case 2:
-      return each([](int up) { return up; });
-    case 3:
-      return each([&](int up) { return (left + up) / 2; });
-    case 4:
-      return each([&](int up) {  // Paeth: of the three the one next to left + up - corner
-        const int to_left = std::abs(up - corner), to_up = std::abs(left - corner);
-        const int to_corner = std::abs(left + up - 2 * corner);
-        if (to_left <= to_up && to_left <= to_corner) return int{left};
-        return to_up <= to_corner ? up : int{corner};
-      });
-    default:
-      return false;
-  }
-}
-
-// What cameras' recordings are made of: eight bits of grey, not interlaced, in a file that says nothing else.
-// libdeflate reads these in less than half of the time. None where anything else stands in the file or is
-// wrong with it: libpng has the word then.
-std::optional<cairn::Image> decode_plain_png(std::string_view bytes) {
-  bytes.remove_prefix(png_signature.size());
-  std::optional<Chunk> chunk = take_chunk(bytes);
-  constexpr std::string_view eight_bits_of_grey("\x08\0\0\0\0", 5);
-  if (!chunk || chunk->type != "IHDR" || chunk->data.size() != 13 ||
-      chunk->data.substr(8) != eight_bits_of_grey)
-    return std::nullopt;
-  const std::size_t width = big_endian(chunk->data.substr(0, 4)),
-                    height = big_endian(chunk->data.substr(4, 4));
-  if (width == 0 || height == 0 || width * height > most_pixels) return std::nullopt;
-  std::string deflated;
-  deflated.reserve(bytes.size());
-  while ((chunk = take_chunk(bytes)) && chunk->type == "IDAT") deflated += chunk->data;
-  if (!chunk || chunk->type != "IEND") return std::nullopt;
-
-  const std::size_t row_size = 1 + width, size = row_size * height;
-  const auto coded = std::make_unique_for_overwrite<std::uint8_t[]>(size);
-  const std::unique_ptr<libdeflate_decompressor, decltype(&libdeflate_free_decompressor)> inflater(
-      libdeflate_alloc_decompressor(), &libdeflate_free_decompressor);
-  if (!inflater || libdeflate_zlib_decompress(inflater.get(), deflated.data(), deflated.size(), coded.get(),
-                                              size, nullptr) != LIBDEFLATE_SUCCESS)
-    return std::nullopt;
-  cairn::Image image(static_cast<int>(width), static_cast<int>(height));
-  const std::vector<std::uint8_t> black(width);
-  for (std::size_t y = 0; y < height; ++y)
-    if (!unfilter(coded.get() + y * row_size, y == 0 ? black.data() : image.row(static_cast<int>(y) - 1),
-                  image.row(static_cast<int>(y)), width))
-      return std::nullopt;
-  return image;
-}
-
-#endif
 
 #ifdef EXAMPLES_HAVE_JPEG
 
@@ -197,13 +95,9 @@ cairn::Image decode_jpeg(const std::filesystem::path& path, std::string_view byt
 
 cairn::Image read_image(const std::filesystem::path& path) {
   const std::string bytes = cairn::read_file(path, "a PNG, JPEG or PGM image");
+  constexpr std::string_view png_signature("\x89PNG\r\n\x1a\n", 8);
   if (bytes.empty()) refuse(path, "empty file");
-  if (bytes.starts_with(png_signature)) {
-#ifdef EXAMPLES_HAVE_DEFLATE
-    if (std::optional<cairn::Image> image = decode_plain_png(bytes)) return *std::move(image);
-#endif
-    return decode_png(path, bytes);
-  }
+  if (bytes.starts_with(png_signature)) return decode_png(path, bytes);
   if (bytes.starts_with("\xFF\xD8\xFF")) {
 #ifdef EXAMPLES_HAVE_JPEG
     return decode_jpeg(path, bytes);

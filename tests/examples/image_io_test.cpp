@@ -44,29 +44,6 @@ void write_foreign_png(const std::filesystem::path& path, unsigned width, unsign
   REQUIRE(png_image_write_to_file(&image, path.c_str(), 0, samples.data(), 0, nullptr) != 0);
 }
 
-// Eight bits of grey in the forms that a PNG allows.
-void write_grey_png(const std::filesystem::path& path, const cairn::Image& image, int filter, bool interlaced,
-                    bool described) {
-  std::FILE* file = std::fopen(path.c_str(), "wb");
-  REQUIRE(file != nullptr);
-  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
-  png_infop info = png_create_info_struct(png);
-  png_init_io(png, file);
-  png_set_IHDR(png, info, static_cast<png_uint_32>(image.width()), static_cast<png_uint_32>(image.height()),
-               8, PNG_COLOR_TYPE_GRAY, interlaced ? PNG_INTERLACE_ADAM7 : PNG_INTERLACE_NONE,
-               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
-  png_set_filter(png, PNG_FILTER_TYPE_BASE, filter);
-  png_set_compression_buffer_size(png, 1000);  // several IDAT chunks
-  if (described) png_set_pHYs(png, info, 1000, 1000, PNG_RESOLUTION_METER);
-  png_write_info(png, info);
-  std::vector<png_bytep> rows;
-  for (int y = 0; y < image.height(); ++y) rows.push_back(const_cast<png_bytep>(image.row(y)));
-  png_write_image(png, rows.data());
-  png_write_end(png, info);
-  png_destroy_write_struct(&png, &info);
-  std::fclose(file);
-}
-
 // The message with which a file is refused; empty where it is read.
 std::string refusal(const std::filesystem::path& path) {
   try {
@@ -108,36 +85,6 @@ TEST_SUITE("image_io") {
     CHECK(image(0, 0) > image(2, 0));
     CHECK(image(2, 0) > 0);
     CHECK(int(image(3, 0)) == 90);
-  }
-
-  TEST_CASE(
-      "image_io: eight bits of grey come back whatever filter, interlacing, chunks and file they stand in") {
-    const auto seed = cairn_test::seed();
-    CAPTURE(seed);
-    cairn::Random random(seed);
-    const cairn_test::Folder folder;
-    const auto path = folder / "grey.png";
-    for (const int width : {1, 2, 37, 300}) {
-      const cairn::Image image = random_image(width, 300 / width + 2, random);
-      for (const int filter : {PNG_FILTER_NONE, PNG_FILTER_SUB, PNG_FILTER_UP, PNG_FILTER_AVG,
-                               PNG_FILTER_PAETH, PNG_ALL_FILTERS})
-        for (const bool interlaced : {false, true})
-          for (const bool described : {false, true}) {
-            CAPTURE(width);
-            CAPTURE(filter);
-            CAPTURE(interlaced);
-            CAPTURE(described);
-            write_grey_png(path, image, filter, interlaced, described);
-            CHECK(example::read_image(path) == image);
-            // What stands behind the end is nobody's; a checksum of pixels that is wrong is somebody's fault.
-            std::string bytes = cairn::read_file(path);
-            cairn::write_file_atomically(path, bytes + "tail");
-            CHECK(example::read_image(path) == image);
-            bytes[bytes.size() - 13] = static_cast<char>(bytes[bytes.size() - 13] ^ 1);
-            cairn::write_file_atomically(path, bytes);
-            CHECK(names(refusal(path), "grey.png: damaged PNG"));
-          }
-    }
   }
 
   TEST_CASE("image_io: sixteen bits become the eight above") {
