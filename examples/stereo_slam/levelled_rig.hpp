@@ -28,8 +28,8 @@ struct LevelledRig {
 };
 
 /// The rig levelled, where half as many pairs again are found by it as `pairs`, those of the rig as it is: of
-/// both only those whose grey levels agree. Nothing where that is not so, nor where the options refine no
-/// pairs.
+/// both only those whose grey levels agree. Nothing where that is not so, where two thirds of `pairs` agree,
+/// nor where the options refine no pairs.
 [[nodiscard]] std::optional<LevelledRig> levelled(const cairn::StereoRig& rig,
                                                   const StereoMatcherOptions& options,
                                                   const StereoFrame& frame, const FramePoints& points,
