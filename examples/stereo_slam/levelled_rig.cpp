@@ -39,7 +39,7 @@ std::optional<LevelledRig> levelled(const cairn::StereoRig& rig, const StereoMat
     return agreeing_pixels(
         StereoMatcher(by, within)(frame.left, points.left, frame.right, points.right, threads));
   };
-  constexpr double share_of_height = 0.05, largest = 0.05;  // [rad]
+  constexpr double share_of_height = 0.05;
   const auto far = found_by(rig, std::max(options.band, share_of_height * frame.left.height()));
   const double rows = vertical_disparity(rig, far).offset;
   if (!(std::abs(rows) > 0.5 * options.band)) return std::nullopt;
@@ -48,7 +48,7 @@ std::optional<LevelledRig> levelled(const cairn::StereoRig& rig, const StereoMat
     constexpr double step = 1e-4;
     const double slope = (vertical_disparity(pitched(rig, angle + step), far).offset - beyond) / step;
     angle -= beyond / slope;
-    if (!(std::abs(angle) < largest)) return std::nullopt;
+    if (!(std::abs(angle) < largest_pitch)) return std::nullopt;
     beyond = vertical_disparity(pitched(rig, angle), far).offset;
   }
   const LevelledRig result{pitched(rig, angle), angle, rows};

@@ -21,6 +21,9 @@
 
 namespace stereo_slam {
 
+/// No camera is taken to be turned by more [rad].
+inline constexpr double largest_pitch = 0.05;
+
 struct LevelledRig {
   cairn::StereoRig rig;  ///< the right camera turned about its x axis so that pairs share a row
   double angle = 0;      ///< by which it is turned [rad]

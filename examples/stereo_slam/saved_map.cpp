@@ -16,6 +16,8 @@
 #include <cairn/io/file.hpp>
 #include <cairn/slam/keyframe_map_file.hpp>
 
+#include "levelled_rig.hpp"
+
 namespace stereo_slam {
 namespace {
 
@@ -112,7 +114,7 @@ SavedMap load_map(const std::filesystem::path& path) {
 
 void expect_same_rig(const cairn::StereoRig& of_map, const cairn::StereoRig& rig, const std::string& name) {
   cairn::Vector<6> apart = cairn::local(of_map.T_left_right, rig.T_left_right);
-  apart(3) = 0;  // the run that made the map may have levelled it (levelled_rig.hpp)
+  if (std::abs(apart(3)) < largest_pitch) apart(3) = 0;  // the run that made the map may have levelled it
   if (same(of_map.left, rig.left) && same(of_map.right, rig.right) && apart.norm() < 1e-9) return;
   cairn::raise(name + ": this map was made with another rig than these images (" +
                std::to_string(of_map.left.width()) + " x " + std::to_string(of_map.left.height()) +

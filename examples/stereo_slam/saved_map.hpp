@@ -37,7 +37,8 @@ void save_map(const std::filesystem::path& path, const SavedMap& saved);
 [[nodiscard]] SavedMap load_map(const std::filesystem::path& path);
 
 /// Throws cairn::Error, with `name` of the map, where it was not made with this rig (as its file says it is,
-/// not as it was corrected), or with it and its right camera pitched (levelled_rig.hpp).
+/// not as it was corrected), or with it and its right camera pitched by as much as levelled_rig.hpp turns
+/// one.
 void expect_same_rig(const cairn::StereoRig& of_map, const cairn::StereoRig& rig, const std::string& name);
 
 }  // namespace stereo_slam

@@ -112,6 +112,8 @@ TEST_SUITE("levelled rig") {
     CHECK(run.notes[0].find("turned by -0.6") != std::string::npos);
     CHECK(cairn::local(run.rig.T_left_right, data->rig().T_left_right).tail<3>().norm() < 1e-3);
     CHECK_NOTHROW(stereo_slam::Pipeline(rig, options, pipeline.map(), "map"));  // is a map of this rig
+    CHECK_THROWS_WITH_AS(stereo_slam::Pipeline(pitched(data->rig(), 4), options, pipeline.map(), "map"),
+                         doctest::Contains("made with another rig"), cairn::Error);
 
     options.calibrate = stereo_slam::Calibration::off;
     stereo_slam::Pipeline as_given(rig, options);
