@@ -10,6 +10,7 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/counted.hpp>
+#include <cairn/core/explain.hpp>
 #include <cairn/core/factor.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/ode.hpp>

@@ -32,6 +32,7 @@
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/explain.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/field/detail/correlation_refinement.hpp>

@@ -18,6 +18,7 @@
 #include <optional>
 #include <vector>
 
+#include <cairn/core/explain.hpp>
 #include <cairn/field/field_map.hpp>
 #include <cairn/version.hpp>
 

@@ -13,6 +13,7 @@
 #include <Eigen/Core>
 
 #include <cairn/core/cholesky.hpp>
+#include <cairn/core/explain.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/version.hpp>
 

@@ -24,6 +24,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/cholesky.hpp>
+#include <cairn/core/explain.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/symmetric_eigen.hpp>
 #include <cairn/manifold/se3.hpp>

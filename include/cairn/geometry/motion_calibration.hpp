@@ -26,6 +26,7 @@
 #include <vector>
 
 #include <cairn/core/cholesky.hpp>
+#include <cairn/core/explain.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/geometry/detail/robust_pose.hpp>

@@ -28,6 +28,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/cholesky.hpp>
+#include <cairn/core/explain.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/core/statistics.hpp>
 #include <cairn/geometry/alignment.hpp>

@@ -25,6 +25,7 @@
 #include <span>
 #include <vector>
 
+#include <cairn/core/explain.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/geometry/stereo_match.hpp>
 #include <cairn/geometry/stereo_pose_options.hpp>

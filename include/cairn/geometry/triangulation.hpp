@@ -22,6 +22,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/cholesky.hpp>
+#include <cairn/core/explain.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/geometry/camera.hpp>
 #include <cairn/geometry/stereo_rig.hpp>

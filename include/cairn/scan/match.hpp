@@ -25,6 +25,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/cholesky.hpp>
+#include <cairn/core/explain.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/grid/distance_field.hpp>
 #include <cairn/grid/tile.hpp>

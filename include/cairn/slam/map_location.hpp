@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <vector>
 
+#include <cairn/core/explain.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/manifold/se3.hpp>
 #include <cairn/version.hpp>

@@ -6,7 +6,7 @@
 
 #include "support/explained.hpp"
 
-namespace explain_test {
+namespace status_test {
 namespace {
 
 TEST_CASE("every status has a sentence of its own") {
@@ -14,4 +14,4 @@ TEST_CASE("every status has a sentence of its own") {
 }
 
 }  // namespace
-}  // namespace explain_test
+}  // namespace status_test
