@@ -69,6 +69,12 @@ struct Gaussian {
   }
 };
 
+/// `Gaussian belief{Vector<4>::Zero(), 100 * Matrix<4>::Identity()}` is of a Vector<4>.
+template <Manifold X, class P>
+Gaussian(const X& mean, const P& covariance) -> Gaussian<X>;
+template <detail::EigenExpression M, class P>
+Gaussian(const M& mean, const P& covariance) -> Gaussian<Vector<M::RowsAtCompileTime, typename M::Scalar>>;
+
 namespace detail {
 
 template <class S>

@@ -187,9 +187,15 @@ inline constexpr bool explain_state = [] {
   return false;
 }();
 
-/// A state, or the sentence: for what takes one, not for asking.
+/// What Eigen has yet to compute, as Vector<4>::Zero().
+template <class A>
+concept EigenExpression =
+    requires { typename A::PlainObject; } && !std::is_same_v<A, typename A::PlainObject>;
+
+/// A state, or the sentence: for what takes one, not for asking. Of an expression it is only asked, where the
+/// arguments of a template are deduced.
 template <class X>
-concept StateAsked = Manifold<X> || explain_state<X>;
+concept StateAsked = Manifold<X> || (!EigenExpression<X> && explain_state<X>);
 
 /// Which part of a model is asked for.
 enum class Role { any, process, sensor };
