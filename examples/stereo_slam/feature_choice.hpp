@@ -11,6 +11,8 @@
 
 #include <cairn/vision/features.hpp>
 
+#include "riding_along.hpp"
+
 namespace stereo_slam {
 
 enum class FeatureKind { surf, sift, orb };
@@ -38,5 +40,7 @@ static_assert(cairn::FeatureExtractor<Extractor>);
 
 /// Throws cairn::Error where the kind needs OpenCV and there is none.
 [[nodiscard]] Extractor make_extractor(const FeatureOptions& options);
+/// SURF keeps as many points as without outside of what is hidden, and a tenth as many within.
+[[nodiscard]] Extractor make_extractor(const FeatureOptions& options, HiddenCells hidden);
 
 }  // namespace stereo_slam

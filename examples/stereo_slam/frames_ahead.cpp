@@ -30,6 +30,11 @@ void FramesAhead::match_by(std::shared_ptr<const StereoMatcher> matcher) {
   matcher_ = std::move(matcher);
 }
 
+void FramesAhead::leave_alone(std::shared_ptr<const HiddenParts> parts) {
+  const std::lock_guard lock(mutex_);
+  left_alone_ = std::move(parts);
+}
+
 void FramesAhead::keep(int points) {
   const std::lock_guard lock(mutex_);
   points_ = points;
@@ -44,6 +49,7 @@ FrameAhead FramesAhead::make(std::size_t i, unsigned thread) {
   std::unique_lock lock(mutex_);
   std::shared_ptr<const StereoMatcher> matcher = matcher_;
   front_ends_[thread].keep(points_);
+  front_ends_[thread].leave_alone(left_alone_);
   lock.unlock();
   made.points = front_ends_[thread](made.frame, std::move(matcher));
   return made;

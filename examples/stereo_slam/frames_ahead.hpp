@@ -53,6 +53,8 @@ public:
 
   /// From now on the pairs are found as well, by this matcher (nullptr: not).
   void match_by(std::shared_ptr<const StereoMatcher> matcher);
+  /// From now on these parts of the images are left alone, in frames that are under way not yet.
+  void leave_alone(std::shared_ptr<const HiddenParts> parts);
   /// From now on so many points are kept in an image. In frames that are under way it is as before: with more
   /// than one thread it depends on the clock which frame is the first.
   void keep(int points);
@@ -64,6 +66,7 @@ private:
   std::vector<FrontEnd> front_ends_;  // one a thread
   std::mutex mutex_;
   std::shared_ptr<const StereoMatcher> matcher_;  // under the mutex, as the next
+  std::shared_ptr<const HiddenParts> left_alone_;
   int points_;
   example::Ahead<FrameAhead> ahead_;  // the last member: its threads use the others
 };

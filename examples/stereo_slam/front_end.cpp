@@ -26,16 +26,27 @@ FrontEnd::FrontEnd(const FeatureOptions& features, unsigned threads)
       left_(make_extractor(features_)),
       right_(make_extractor(features_)) {}
 
+void FrontEnd::make_extractors() {
+  left_ = make_extractor(features_, left_alone_ ? (*left_alone_)[0] : HiddenCells());
+  right_ = make_extractor(features_, left_alone_ ? (*left_alone_)[1] : HiddenCells());
+}
+
 void FrontEnd::keep(int points) {
   if (points == features_.points) return;
   features_.points = points;
-  left_ = make_extractor(features_);
-  right_ = make_extractor(features_);
+  make_extractors();
+}
+
+void FrontEnd::leave_alone(std::shared_ptr<const HiddenParts> parts) {
+  if (parts == left_alone_) return;
+  left_alone_ = std::move(parts);
+  make_extractors();
 }
 
 FramePoints FrontEnd::operator()(const StereoFrame& frame, std::shared_ptr<const StereoMatcher> matcher) {
   FramePoints points;
   points.wanted = features_.points;
+  points.left_alone = left_alone_;
   {
     const Stopwatch watch(points.detect_milliseconds);
     cairn::parallel_for(2, threads_, [&](std::size_t begin, std::size_t end) {

@@ -16,6 +16,7 @@
 
 #include "dataset.hpp"
 #include "feature_choice.hpp"
+#include "riding_along.hpp"
 #include "stereo_matcher.hpp"
 
 namespace stereo_slam {
@@ -27,8 +28,9 @@ struct FramePoints {
   /// Where matched_by is there: the pairs that it found.
   std::vector<PointPair> pairs;
   std::shared_ptr<const StereoMatcher> matched_by;
-  double detect_milliseconds = 0;  ///< that the points took
-  double stereo_milliseconds = 0;  ///< that the pairs took
+  std::shared_ptr<const HiddenParts> left_alone;  ///< only few were looked for there
+  double detect_milliseconds = 0;                 ///< that the points took
+  double stereo_milliseconds = 0;                 ///< that the pairs took
 };
 
 /// Has the memory of its extractors: one object a thread.
@@ -43,14 +45,22 @@ public:
   /// kept before. Where the number changes the extractors are made anew.
   void keep(int points);
 
+  /// From now on parts of the images are left alone (nullptr: none): what is kept lies elsewhere, but for a
+  /// tenth as many more that show whether the parts still look as they did. OpenCV's points are not chosen by
+  /// where they lie.
+  void leave_alone(std::shared_ptr<const HiddenParts> parts);
+
   /// The points of a frame; their pairs where there is a matcher.
   [[nodiscard]] FramePoints operator()(const StereoFrame& frame,
                                        std::shared_ptr<const StereoMatcher> matcher = nullptr);
 
 private:
+  void make_extractors();
+
   FeatureOptions features_;  // of one image
   unsigned threads_;
   Extractor left_, right_;
+  std::shared_ptr<const HiddenParts> left_alone_;
 };
 
 }  // namespace stereo_slam

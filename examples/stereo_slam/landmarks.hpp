@@ -10,12 +10,14 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/linalg.hpp>
 
 #include "surface_patch.hpp"
 
@@ -31,6 +33,9 @@ struct Landmark {
   std::shared_ptr<const SurfacePatch> patch;  ///< what it looked like when it was first seen
   int first_seen = 0;                         ///< step
   int last_seen = 0;                          ///< step
+  /// Where the left and the right image showed it first; of a map that was loaded that is not known.
+  cairn::Vector<4, float> first_pixels =
+      cairn::Vector<4, float>::Constant(std::numeric_limits<float>::quiet_NaN());
   int sightings = 1;
   int expected = 1;  ///< frames in which it was seen or should have been
 };

@@ -228,6 +228,7 @@ Run run(const stereo_slam::Dataset& dataset, const Arguments& arguments, example
       const stereo_slam::FrameAhead next = frames.take();
       const stereo_slam::FrameRecord& done = pipeline.step(next.frame, next.points, next.load_milliseconds);
       frames.match_by(pipeline.settled_matcher());
+      frames.leave_alone(pipeline.left_alone());
       frames.keep(pipeline.wanted_points());
       progress.step(done.tracked
                         ? std::to_string(done.inliers) + " of " + std::to_string(done.stereo_matches) +

@@ -49,6 +49,13 @@ cairn::KeyframeMapOptions map_options(const PipelineOptions& options) {
   return map;
 }
 
+using Pixels = std::vector<cairn::Vector<2>>;
+
+/// How far a point may wander that stands still: what shakes by half a pixel, and the noise of its keypoint.
+double stillness(double sigma) {
+  return 1 + 3 * sigma;
+}
+
 std::string as_asked(const PipelineOptions& options) {
   return std::string("asked for: ") + calibration_names[static_cast<std::size_t>(options.calibrate)];
 }
@@ -74,6 +81,7 @@ FeatureOptions feature_options(const PipelineOptions& options) {
 
 Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options)
     : options_(options),
+      given_(rig),
       rig_(rig),
       match_stereo_(std::make_shared<const StereoMatcher>(rig, options.stereo)),
       triangulate_(rig, triangulation_options(options, rig)),
@@ -108,6 +116,7 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options, 
     cairn::raise(name + ": this map does not estimate its rig, which has to begin with the map");
   if (options.calibrate == Calibration::off && known.map.rig_correction())
     cairn::raise(name + ": this map estimates its rig, which cannot be left as it was given");
+  may_begin_again_ = false;
   map_ = std::move(known.map);
   noise_factors_ = NoiseFactors(map_.pixel_factor(), map_.pose_factor());
   step_ = known.steps;
@@ -127,11 +136,18 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options, 
 const FrameRecord& Pipeline::step(const StereoFrame& frame, double load_milliseconds) {
   if (!front_end_) front_end_.emplace(feature_options(options_), options_.threads);
   front_end_->keep(budget_.points());
+  front_end_->leave_alone(left_alone_);
   return step(frame, (*front_end_)(frame, match_stereo_), load_milliseconds);
 }
 
 const FrameRecord& Pipeline::step(const StereoFrame& frame, const FramePoints& points,
                                   double load_milliseconds) {
+  if (points.left_alone != left_alone_) {  // they were found before this was known
+    if (!front_end_) front_end_.emplace(feature_options(options_), options_.threads);
+    front_end_->keep(points.wanted > 0 ? points.wanted : budget_.points());
+    front_end_->leave_alone(left_alone_);
+    return step(frame, (*front_end_)(frame, match_stereo_), load_milliseconds);
+  }
   FrameRecord& result = record_.frames.emplace_back();
   const auto of = [&](Stage stage) -> double& {
     return result.milliseconds[static_cast<std::size_t>(stage)];
@@ -143,10 +159,12 @@ const FrameRecord& Pipeline::step(const StereoFrame& frame, const FramePoints& p
   begun_ = std::chrono::steady_clock::now();
   try {
     work_on(frame, points, result);
+    if (may_begin_again_) beginning_.push_back(frame);
   } catch (...) {
     record_.frames.pop_back();  // the record holds whole frames
     throw;
   }
+  if (begin_again()) return record_.frames.back();
   result.points_wanted = points.wanted;
   result.shed = budget_.finish(result.points_left, points.wanted, of(Stage::total));
   return result;
@@ -186,6 +204,9 @@ void Pipeline::work_on(const StereoFrame& frame, const FramePoints& points, Fram
   left_ = &points.left;
   image_ = frame.left;
   timed(result, Stage::total, [&] {
+    if (riding_along_.empty())
+      for (const cairn::Image* image : {&frame.left, &frame.right})
+        riding_along_.emplace_back(image->width(), image->height());
     const std::optional<std::string> torn = of_two_moments(frame);
     timed(result, Stage::stereo, [&] {
       std::vector<PointPair> pairs =
@@ -195,7 +216,7 @@ void Pipeline::work_on(const StereoFrame& frame, const FramePoints& points, Fram
       if (!torn && record_.frames.size() <= beginning)
         if (const auto why = mistaken_sides(rig_, options_.stereo, frame, points, pairs, options_.threads))
           cairn::raise(frame.name + ": " + *why);
-      find_local_landmarks(pairs);
+      find_local_landmarks(points, pairs);
     });
     motion_.predict(seconds_between(time_.value_or(frame.time), frame.time));
     time_ = frame.time;
@@ -206,6 +227,7 @@ void Pipeline::work_on(const StereoFrame& frame, const FramePoints& points, Fram
     else
       follow(frame, result);
   });
+  note_what_rides_along();
   if (frame.truth && (T_truth_world_ || !lost_)) {
     if (!T_truth_world_) T_truth_world_ = *frame.truth * T_world_camera_.inverse();
     result.truth = T_truth_world_->inverse() * *frame.truth;
@@ -385,9 +407,15 @@ std::vector<PointPair> Pipeline::pairs_of(const StereoFrame& frame, const FrameP
 }
 
 /// The stereo pairs that make points in space.
-void Pipeline::find_local_landmarks(std::span<const PointPair> pairs) {
+void Pipeline::find_local_landmarks(const FramePoints& points, std::span<const PointPair> pairs) {
   locals_.clear();
+  left_out_.clear();
+  riding_along_[0].watch(points.left);
+  riding_along_[1].watch(points.right);
   for (const PointPair& pair : pairs) {
+    if (riding_along_[0].hidden().hides(pair.left_pixel(0), pair.left_pixel(1)) ||
+        riding_along_[1].hidden().hides(pair.right_pixel(0), pair.right_pixel(1)))
+      continue;
     const double scale = left_->keypoints[pair.left].scale;
     const double sigma = options_.pixel_sigma * std::pow(scale, options_.scale_exponent);
     const cairn::Triangulation seen = triangulate_(pair.left_pixel, pair.right_pixel, sigma, sigma);
@@ -441,7 +469,9 @@ std::optional<Pipeline::Located> Pipeline::locate(std::vector<Match>& matches) {
     pose = estimate(near);
   }
   matches = std::move(near);
+  if (auto other = farther_reaching(pose, matches)) pose = std::move(*other);
   if (!pose.good()) return std::nullopt;
+  leave_out_what_rides_along(pose, matches);
   expected_.clear();
   if_time(Shed::second_look, [&] { look_again(pose, matches); });
   Located located;
@@ -456,6 +486,164 @@ std::optional<Pipeline::Located> Pipeline::locate(std::vector<Match>& matches) {
   }
   if (lost_ && located.agreed.size() < options_.relocating_inliers) return std::nullopt;
   return located;
+}
+
+/// Whether both images show a match's landmark where they showed it first.
+bool Pipeline::stands_still(const Match& match) const {
+  const LocalLandmark& local = locals_[match.local];
+  const cairn::Vector<4> before = landmarks_[match.landmark].first_pixels.cast<double>();
+  cairn::Vector<4> now;
+  now << local.left_pixel, local.right_pixel - local.moved;
+  return (now - before).cwiseAbs().maxCoeff() < stillness(local.sigma);
+}
+
+/// Of the matches those that stand still though the camera, were it there, would see them elsewhere than at
+/// first, by more than twice what stillness allows.
+std::vector<std::size_t> Pipeline::still_against(const cairn::SE3& T_world_camera,
+                                                 std::span<const Match> matches) {
+  std::vector<std::size_t> result;
+  const cairn::SE3 T_camera_world = T_world_camera.inverse();
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (!stands_still(matches[i])) continue;
+    const auto landmark = map_.landmark(matches[i].landmark);
+    if (!landmark) continue;
+    const auto due = rig_.left.project(T_camera_world * landmark->mean);
+    const cairn::Vector<2> first = landmarks_[matches[i].landmark].first_pixels.head<2>().cast<double>();
+    if (!due || (*due - first).norm() > 2 * stillness(locals_[matches[i].local].sigma)) result.push_back(i);
+  }
+  return result;
+}
+
+/// The other of two motions that matches agree on, where it reaches farther over the image
+/// (riding_along.hpp): that of those that moved, where most that agree on `pose`, or all that could, stand
+/// still; otherwise that of those that stand still.
+std::optional<cairn::StereoPose> Pipeline::farther_reaching(const cairn::StereoPose& pose,
+                                                            const std::vector<Match>& matches) {
+  std::vector<std::size_t> still, moved;
+  std::size_t still_agree = 0, moved_agree = 0;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const bool agrees = pose.good() && pose.inliers[i] != 0;
+    const bool stands = stands_still(matches[i]);
+    (stands ? still : moved).push_back(i);
+    (stands ? still_agree : moved_agree) += agrees ? 1 : 0;
+  }
+  const bool stood = !pose.good() || still_agree > moved_agree;
+  const auto reaches = [&](const std::vector<std::size_t>& some, const auto& counts) {
+    Pixels pixels;
+    for (const std::size_t i : some)
+      if (counts(i)) pixels.push_back(locals_[matches[i].local].left_pixel);
+    return pixels.empty() ? 0 : reach(pixels);
+  };
+  const auto unsuspected = [&](std::size_t i) {
+    return !riding_along_[0].suspects(locals_[matches[i].local].left_pixel);
+  };
+  const auto agreed_by = [&](std::vector<std::size_t> some) -> std::optional<cairn::StereoPose> {
+    std::vector<Match> part;
+    for (const std::size_t i : some) part.push_back(matches[i]);
+    cairn::StereoPose result =
+        cairn::estimate_stereo_pose(rig_, observations(part), pose_options(), prediction());
+    if (!result.good() || result.inlier_count < options_.relocating_inliers) return std::nullopt;
+    std::vector<std::uint8_t> inliers(matches.size(), 0);
+    for (std::size_t k = 0; k < some.size(); ++k) inliers[some[k]] = result.inliers[k];
+    result.inliers = std::move(inliers);
+    return result;
+  };
+  if (stood) {
+    if (moved.size() - moved_agree < options_.relocating_inliers || still.size() < options_.min_inliers)
+      return std::nullopt;
+    auto other = agreed_by(moved);
+    if (!other) return std::nullopt;
+    const double farther = reaches(moved, [&](std::size_t i) { return other->inliers[i] != 0; });
+    if (farther < reaches(still_against(other->T_world_camera, matches), unsuspected)) return std::nullopt;
+    return other;
+  }
+  const std::vector<std::size_t> against = still_against(pose.T_world_camera, matches);
+  if (against.size() < options_.relocating_inliers ||
+      reaches(against, unsuspected) <= reaches(moved, [&](std::size_t i) { return pose.inliers[i] != 0; }))
+    return std::nullopt;
+  return agreed_by(against);
+}
+
+/// Takes the matches out of which enough stand still against the motion; where they do so for several frames
+/// that part of the image is no longer looked at.
+void Pipeline::leave_out_what_rides_along(cairn::StereoPose& pose, std::vector<Match>& matches) {
+  const std::vector<std::size_t> against = still_against(pose.T_world_camera, matches);
+  if (against.size() < options_.min_inliers) return;
+  std::array<Pixels, 2> still, moved;
+  const auto add = [&](std::array<Pixels, 2>& to, std::size_t match) {
+    to[0].push_back(locals_[matches[match].local].pair.left_pixel);
+    to[1].push_back(locals_[matches[match].local].pair.right_pixel);
+  };
+  for (const std::size_t i : against) {
+    left_out_.push_back(matches[i].local);
+    add(still, i);
+  }
+  for (std::size_t i = 0; i < matches.size(); ++i)
+    if (pose.inliers[i] != 0 && !stands_still(matches[i])) add(moved, i);
+  for (auto i = against.rbegin(); i != against.rend(); ++i) {
+    matches.erase(matches.begin() + static_cast<std::ptrdiff_t>(*i));
+    pose.inliers.erase(pose.inliers.begin() + static_cast<std::ptrdiff_t>(*i));
+  }
+  for (const std::size_t side : {std::size_t{0}, std::size_t{1}})
+    riding_along_[side].judge(still[side], moved[side]);
+}
+
+/// For the record, and for those who look for the points of the next frames. These are not bothered with
+/// every cell: frames that are under way are looked at once more then.
+void Pipeline::note_what_rides_along() {
+  const HiddenParts now{riding_along_[0].hidden(), riding_along_[1].hidden()};
+  const std::size_t count = now[0].count() + now[1].count();
+  const std::size_t before = left_alone_ ? (*left_alone_)[0].count() + (*left_alone_)[1].count() : 0;
+  if (count == 0 && before == 0) return;
+  const std::size_t unlike =
+      left_alone_ ? now[0].unlike((*left_alone_)[0]) + now[1].unlike((*left_alone_)[1]) : count;
+  if (count == 0)
+    left_alone_.reset();
+  else if (8 * unlike > before)
+    left_alone_ = std::make_shared<const HiddenParts>(now);
+  RidingAlongRecord& record = record_.riding_along;
+  record.share = riding_along_[0].share();
+  record.largest_share = std::max(record.largest_share, record.share);
+  if (record.since || !(record.share > 0)) return;
+  const std::size_t index = record_.frames.back().index;
+  record.since = index;
+  record_.notes.push_back(
+      "from frame " + std::to_string(index) +
+      " on a part of the image is left out: what is seen there stands still while the "
+      "camera moves, as its own vehicle or mount, dirt on the lenses, or what drives ahead");
+}
+
+/// What rides along and is noticed in the first frames was taken for the world until then, by the rig's
+/// calibration as well: they are looked at anew without it, from where the map began. False where that is not
+/// so.
+bool Pipeline::begin_again() {
+  constexpr std::size_t longest = 12;  // frames
+  if (!may_begin_again_) return false;
+  const bool noticed = left_alone_ != nullptr;
+  may_begin_again_ = !noticed && beginning_.size() < longest;
+  const std::vector<StereoFrame> frames =
+      may_begin_again_ ? std::vector<StereoFrame>() : std::exchange(beginning_, {});
+  if (!noticed) return false;
+  Pipeline again(given_, options_);
+  again.may_begin_again_ = false;
+  again.riding_along_ = std::move(riding_along_);
+  again.left_alone_ = std::move(left_alone_);
+  again.record_.riding_along = record_.riding_along;
+  again.record_.notes.push_back(record_.notes.back());
+  std::vector<double> loading;
+  for (const FrameRecord& frame : record_.frames)
+    loading.push_back(frame.milliseconds[static_cast<std::size_t>(Stage::load)]);
+  *this = std::move(again);
+  for (std::size_t i = 0; i < frames.size(); ++i) step(frames[i], loading[i]);
+  return true;
+}
+
+/// Which points of the frame are taken for a landmark already, or for what rides along.
+std::vector<std::uint8_t> Pipeline::spoken_for(std::span<const Match> matches) const {
+  std::vector<std::uint8_t> taken(locals_.size(), 0);
+  for (const Match& match : matches) taken[match.local] = 1;
+  for (const std::uint32_t local : left_out_) taken[local] = 1;
+  return taken;
 }
 
 /// The matches whose landmark may be seen there from where the motion leads: all of them where that is not
@@ -536,10 +724,9 @@ Places Pipeline::settle(const cairn::SE3& T_world_camera, std::span<const Match>
 /// Landmarks that the keyframes in play saw, and no local one is taken for yet, are searched for where the
 /// pose says they are.
 void Pipeline::look_again(const cairn::StereoPose& pose, std::vector<Match>& matches) {
-  std::vector<std::uint8_t> taken(locals_.size(), 0);
+  const std::vector<std::uint8_t> taken = spoken_for(matches);
   std::vector<LandmarkId> known, in_play;
   for (std::size_t i = 0; i < matches.size(); ++i) {
-    taken[matches[i].local] = 1;
     known.push_back(matches[i].landmark);
     if (pose.inliers[i] != 0) in_play.push_back(matches[i].landmark);
   }
@@ -583,7 +770,8 @@ void Pipeline::move_to(const Located& located, FrameRecord& result) {
 /// A keyframe is due when much less of what is seen is known than was at best since the last one, and can be
 /// put off until it is as much less again.
 void Pipeline::make_keyframe_if_due(const Located& located, const StereoFrame& frame, FrameRecord& result) {
-  const double share = static_cast<double>(located.agreed.size()) / static_cast<double>(locals_.size());
+  const double share =
+      static_cast<double>(located.agreed.size()) / static_cast<double>(locals_.size() - left_out_.size());
   best_share_ = std::max(best_share_, share);
   const double due = options_.keyframe_share * best_share_;
   if (share < due)
@@ -607,8 +795,7 @@ void Pipeline::add_landmarks(const std::vector<Match>& known, const StereoFrame&
   // let it: on a recorded drive that nothing was chosen on, patches doubled the error. Of a rig that comes
   // loose they make a smaller error whose NEES is nine times as large.
   const bool with_patches = options_.patches && !corrects_rig();
-  std::vector<std::uint8_t> taken(locals_.size(), 0);
-  for (const Match& match : known) taken[match.local] = 1;
+  const std::vector<std::uint8_t> taken = spoken_for(known);
   for (std::uint32_t i = 0; i < locals_.size(); ++i) {
     if (taken[i] != 0) continue;
     const cairn::Keypoint& point = left_->keypoints[locals_[i].point];
@@ -631,6 +818,8 @@ void Pipeline::add_landmarks(const std::vector<Match>& known, const StereoFrame&
     landmark.grey =
         frame.left(static_cast<int>(std::lround(point.x)), static_cast<int>(std::lround(point.y)));
     landmark.first_seen = landmark.last_seen = step_;
+    landmark.first_pixels << locals_[i].left_pixel.cast<float>(),
+        (locals_[i].right_pixel - locals_[i].moved).cast<float>();
     landmarks_.add(std::move(landmark));
   }
 }

@@ -40,6 +40,7 @@
 #include "loop_watch.hpp"
 #include "noise_factors.hpp"
 #include "pose_filter.hpp"
+#include "riding_along.hpp"
 #include "run_record.hpp"
 #include "saved_map.hpp"
 #include "self_calibration.hpp"
@@ -133,6 +134,9 @@ public:
   /// What finds the stereo pairs of all frames to come; nullptr while the rig may still be corrected.
   [[nodiscard]] std::shared_ptr<const StereoMatcher> settled_matcher() const;
 
+  /// Where the next frames need no points: what rides along. nullptr where nothing does.
+  [[nodiscard]] std::shared_ptr<const HiddenParts> left_alone() const { return left_alone_; }
+
   /// Points that an image of the next frames should have, to keep within the budget.
   [[nodiscard]] int wanted_points() const noexcept { return budget_.points(); }
 
@@ -173,7 +177,7 @@ private:
   void if_time(Shed kind, const Work& work, bool always = false);
   [[nodiscard]] bool corrects_rig() const;
   [[nodiscard]] std::vector<PointPair> pairs_of(const StereoFrame& frame, const FramePoints& points) const;
-  void find_local_landmarks(std::span<const PointPair> pairs);
+  void find_local_landmarks(const FramePoints& points, std::span<const PointPair> pairs);
   [[nodiscard]] std::vector<Match> match_with_map() const;
   /// Leaves of `matches` what can be where the motion leads, and adds what the second look finds.
   [[nodiscard]] std::optional<Located> locate(std::vector<Match>& matches);
@@ -206,6 +210,15 @@ private:
 
   [[nodiscard]] Places settle(const cairn::SE3& T_world_camera, std::span<const Match> matches,
                               std::span<cairn::StereoSighting> sightings);
+  [[nodiscard]] bool stands_still(const Match& match) const;
+  [[nodiscard]] std::vector<std::size_t> still_against(const cairn::SE3& T_world_camera,
+                                                       std::span<const Match> matches);
+  [[nodiscard]] std::optional<cairn::StereoPose> farther_reaching(const cairn::StereoPose& pose,
+                                                                  const std::vector<Match>& matches);
+  void leave_out_what_rides_along(cairn::StereoPose& pose, std::vector<Match>& matches);
+  void note_what_rides_along();
+  bool begin_again();
+  [[nodiscard]] std::vector<std::uint8_t> spoken_for(std::span<const Match> matches) const;
   void look_again(const cairn::StereoPose& pose, std::vector<Match>& matches);
   void earliest_first(std::vector<Match>& matches) const;
   [[nodiscard]] std::vector<cairn::StereoMatch> observations(std::vector<Match>& matches);
@@ -217,6 +230,7 @@ private:
                                       const std::vector<Match>& agreed) const;
 
   PipelineOptions options_;
+  cairn::StereoRig given_;                 // as it was given
   cairn::StereoRig rig_;                   // as the map knows it
   std::optional<cairn::StereoRig> loose_;  // as it is now, where it is followed
   int shown_off_ = 0;                      // looks in a row that showed that it is not as the map knows it
@@ -243,6 +257,11 @@ private:
   bool lost_ = false;                       // where the camera is is not known from the frame before
   double best_share_ = 0;                   // of a frame's points that the map knew, since the last keyframe
   std::vector<LocalLandmark> locals_;
+  std::vector<RidingAlong> riding_along_;  // of the left and the right image, from the first frame on
+  bool may_begin_again_ = true;
+  std::vector<StereoFrame> beginning_;             // the first frames, while the map may begin again
+  std::shared_ptr<const HiddenParts> left_alone_;  // what points are no longer looked for in
+  std::vector<std::uint32_t> left_out_;            // locals of this frame that stood still against its motion
   cairn::SE3 T_world_camera_;
   cairn::SE3 T_last_camera_;  // motion of the last step, for the prediction
   cairn::Matrix<6> pose_covariance_;

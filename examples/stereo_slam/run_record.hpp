@@ -97,6 +97,13 @@ struct LoopClosure {
   std::optional<cairn::SE3> T_world_before;  ///< pose of the frame by the other landmarks alone
 };
 
+/// What rides along in the image and is left out (riding_along.hpp).
+struct RidingAlongRecord {
+  std::optional<std::size_t> since;  ///< the first frame after which something was, by its number
+  double share = 0;                  ///< of the image, at the end
+  double largest_share = 0;
+};
+
 struct RunRecord {
   std::string dataset;
   std::string features, store, motion = "off";
@@ -108,6 +115,7 @@ struct RunRecord {
   std::vector<FrameRecord> frames;
   std::vector<LandmarkRecord> landmarks;
   CalibrationRecord calibration;
+  RidingAlongRecord riding_along;
   cairn::StereoRig rig;  ///< as it is believed to be at the end
   std::vector<LoopClosure> loops;
   std::vector<cairn::SE3> corrected;  ///< T_world_camera of every frame as the map has it at the end

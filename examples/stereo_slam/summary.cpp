@@ -334,6 +334,10 @@ std::string summary_json(const RunRecord& run, const Summary& summary) {
     one["value"] = number(run.calibration.numbers(i));
     one["sigma"] = number(run.calibration.sigmas(i));
   }
+  Json& riding_along = json["riding_along"];
+  riding_along["since_frame"] = run.riding_along.since ? Json(*run.riding_along.since) : Json(nullptr);
+  riding_along["share_of_image"] = number(run.riding_along.share);
+  riding_along["largest_share_of_image"] = number(run.riding_along.largest_share);
   json["target_points"] = run.target_points;
   if (summary.budget) {
     Json& budget = json["budget"];
