@@ -49,9 +49,12 @@ std::vector<PosePair> paired(const TrajectoryFile& truth, const TrajectoryFile& 
     cairn::raise((truth.has_times ? estimate : truth).path.string() +
                  ": a KITTI file has no times, and the other file has: give its times.txt with --times");
   std::vector<PosePair> pairs = associate(truth.poses, estimate.poses, options);
-  if (pairs.empty())
-    cairn::raise(estimate.path.string() + ": no pose within " + cairn::shortest(options.largest_difference) +
-                 " s of a true one (its times are " + cairn::shortest(estimate.poses.front().time) + " to " +
+  // Of times in other units, or of another clock, one may coincide: the first, at 0.
+  const bool by_chance = pairs.size() == 1 && truth.poses.size() > 1 && estimate.poses.size() > 1;
+  if (pairs.empty() || by_chance)
+    cairn::raise(estimate.path.string() + (by_chance ? ": only one pose within " : ": no pose within ") +
+                 cairn::shortest(options.largest_difference) + " s of a true one (its times are " +
+                 cairn::shortest(estimate.poses.front().time) + " to " +
                  cairn::shortest(estimate.poses.back().time) + ", the truth's " +
                  cairn::shortest(truth.poses.front().time) + " to " +
                  cairn::shortest(truth.poses.back().time) + "; see --offset and --max-difference)");

@@ -201,7 +201,7 @@ void compare_maps(const FieldGrid& field, const FieldGrid& before, const FieldGr
                   LoopResult& result) {
   cairn::RunningMoments mapped;
   for (std::size_t i = 0; i < before.values().size(); ++i)
-    if (!std::isnan(before.values()[i])) mapped.add(field.values()[i]);
+    if (!std::isnan(before.values()[i]) && !std::isnan(field.values()[i])) mapped.add(field.values()[i]);
   result.field_deviation = mapped.standard_deviation();
   result.map_error_before = difference(before, field);
   result.map_error_after = difference(after, field);

@@ -22,6 +22,7 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/random.hpp>
 #include <cairn/field/random_field.hpp>
+#include <cairn/io/text.hpp>
 
 #include "outputs.hpp"
 #include "support/command_line.hpp"
@@ -158,6 +159,11 @@ Results run(const cairn::FieldGrid& field, const Options& options) {
   return results;
 }
 
+/// Of what was found; of nothing there is no error.
+std::string rms_of(bool found, double rms) {
+  return found ? "rms " + cairn::shortest(std::round(1e3 * rms) / 1e3) + " m" : "no rms";
+}
+
 void print(const Results& r, const std::filesystem::path& out) {
   std::cout << "position RMSE over the Cramer-Rao bound  " << r.straight.rmse_over_bound << "\n"
             << "NEES of 5 states                         " << r.straight.nees_mean << "  (band "
@@ -165,10 +171,12 @@ void print(const Results& r, const std::filesystem::path& out) {
   if (r.acquisition)
     std::cout << "acquired within 2 km                     " << 100 * r.acquisition->rate << " % ("
               << 100 * r.acquisition->first_rate << " % at the first frame), wrong "
-              << 100 * r.acquisition->wrong_rate << " %, rms " << r.acquisition->rms_error << " m\n";
+              << 100 * r.acquisition->wrong_rate << " %, "
+              << rms_of(r.acquisition->rate > 0, r.acquisition->rms_error) << "\n";
   if (r.planar)
-    std::cout << "flight with turns                        rms " << r.planar->rms_error << " m, "
-              << r.planar->frames_tracked << " of " << r.planar->points.size() << " frames tracked, "
+    std::cout << "flight with turns                        "
+              << rms_of(r.planar->frames_tracked > 0, r.planar->rms_error) << ", " << r.planar->frames_tracked
+              << " of " << r.planar->points.size() << " frames tracked, "
               << (r.planar->reacquired ? "acquired again after the loss\n"
                                        : "not acquired again after the loss\n");
   if (r.loop)

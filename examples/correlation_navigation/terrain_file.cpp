@@ -47,8 +47,7 @@ FieldGrid read_hgt(const std::filesystem::path& path) {
     for (int c = 0; c < side; ++c, place += 2) {  // the high byte first
       const int high = static_cast<signed char>(bytes[place]),
                 low = static_cast<unsigned char>(bytes[place + 1]);
-      const int height = high * 256 + low;
-      grid(c, side - 1 - r) = height == -32768 ? cairn::void_value : height;  // files begin in the north
+      grid(c, side - 1 - r) = high * 256 + low;  // files begin in the north
     }
   return grid;
 }
@@ -65,6 +64,14 @@ FieldGrid read_pgm_terrain(const std::filesystem::path& path, double spacing) {
   return grid;
 }
 
+/// Whether a number can be the height of ground. Files do not always name their no-data value, and as heights
+/// such holes are cliffs that no place resembles. No ground of the Earth lies 12 km deep (SRTM's -32768 and
+/// -32767, the lowest float); -9999 m lies in a few trenches, where a lost node is no harm.
+bool is_height(double value) {
+  constexpr double deepest = -12000, beyond_all = 1e30, usual_mark = -9999;
+  return value > deepest && value < beyond_all && value != usual_mark;
+}
+
 }  // namespace
 
 FieldGrid read_terrain(const std::filesystem::path& path, double spacing) {
@@ -79,6 +86,9 @@ FieldGrid read_terrain(const std::filesystem::path& path, double spacing) {
   FieldGrid grid = kind == ".pgm"   ? read_pgm_terrain(path, spacing)
                    : kind == ".hgt" ? read_hgt(path)
                                     : read_geotiff(path, spacing);
+  for (int r = 0; r < grid.rows(); ++r)
+    for (int c = 0; c < grid.columns(); ++c)
+      if (!is_height(grid(c, r))) grid(c, r) = cairn::void_value;
   if (std::all_of(grid.values().begin(), grid.values().end(), [](double v) { return std::isnan(v); }))
     cairn::raise(path.string() + ": expected at least one valid height, found voids only");
   return grid;

@@ -23,6 +23,7 @@
 #include "floor_plan.hpp"
 #include "outputs.hpp"
 #include "run.hpp"
+#include "scan_checks.hpp"
 #include "stop_mapper.hpp"
 #include "support/command_line.hpp"
 #include "support/interruption.hpp"
@@ -56,17 +57,19 @@ struct Input {
   std::string name;
   cairn::CarmenLog log;
   std::vector<cairn::PoseRelation> relations;
+  std::vector<std::string> notes;
 };
 
 Input input_of(const Options& options) {
   Input input;
   if (options.log.empty()) {
     const Drive drive = simulated_drive({.seed = options.seed.value_or(1)});
-    input = {"rendered drive", drive.log, true_relations(drive)};
+    input = {"rendered drive", drive.log, true_relations(drive), {}};
   } else {
     input.name = std::filesystem::path(options.log).filename().string();
     input.log = cairn::read_carmen(options.log);
     cairn::place_by_odometry(input.log, options.log);
+    input.notes = check_scans(input.log, options.log);
   }
   if (!options.relations.empty()) input.relations = cairn::read_relations(options.relations);
   return input;
@@ -210,6 +213,7 @@ int main(int argc, char** argv) {
     Results results =
         options.map == Maps::tiles ? map_occupancy(options, input, mapper) : map_stops(options, input);
     results.name = input.name;
+    results.notes.insert(results.notes.begin(), input.notes.begin(), input.notes.end());
     if (results.data_ended) *results.ended_early = input.name + ": " + *results.ended_early;
     if (results.ended_early) std::cerr << name << ": " << *results.ended_early << '\n';
     for (const std::string& note : results.notes) std::cerr << name << ": " << note << '\n';

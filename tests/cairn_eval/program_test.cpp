@@ -270,6 +270,13 @@ TEST_CASE("cairn_eval: what does not belong together is exit code 2 and words th
     CHECK_FALSE(fs::exists(folder / "out"));
   };
   says("truth.tum", "later.tum", "", "--offset");
+  // In nanoseconds one time, 0, is that of a true pose.
+  cairn::Trajectory nanoseconds = truth;
+  for (cairn::StampedPose& pose : nanoseconds) pose.time *= 1e9;
+  cairn::write_tum(folder / "nano.tum", nanoseconds);
+  for (const char* align : {"none", "first", "rigid"})
+    says("truth.tum", "nano.tum", std::string("--align ") + align,
+         "only one pose within 0.01 s of a true one");
   says("truth.tum", "truth.kitti", "", "--times");
   says("truth.kitti", "short.kitti", "",
        (folder / "short.kitti").string() + ": expected as many poses as " +

@@ -1,6 +1,7 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
@@ -122,6 +123,15 @@ TEST_SUITE("correlation_navigation") {
           }).find("meets no void") != std::string::npos);
   }
 
+  TEST_CASE("acquisition: among hills that repeat nothing is accepted") {
+    cairn::FieldGrid hills(500, 500, {0, 0, 30, 30});  // 1885 m apart
+    for (int r = 0; r < 500; ++r)
+      for (int c = 0; c < 500; ++c) hills(c, r) = 50 * (std::sin(0.1 * c) + std::sin(0.1 * r));
+    const AcquisitionResult result = acquire(hills, {.starts = 10, .seed = 3});
+    CHECK(result.wrong_rate == 0.0);  // more than half were
+    CHECK(result.rate <= 0.1);        // one in a corner of the map has no other in reach
+  }
+
   TEST_CASE("planar flight: acquires, tracks through turns, is lost and acquires again") {
     const PlanarResult result =
         fly_planar(ground(8), {.frames = 130, .blind_from = 60, .blind_until = 85, .seed = 3});
@@ -157,6 +167,11 @@ TEST_SUITE("correlation_navigation") {
     CHECK(mapped > 1000);
     CHECK(mapped < 0.9 * static_cast<double>(result.map_error_after->values().size()));
     CHECK(std::sqrt(squares / mapped) == doctest::Approx(result.map_rms_after));
+    cairn::FieldGrid holed = ground(6);
+    for (int r = 0; r < holed.rows(); r += 40)
+      for (int c = 0; c < holed.columns(); c += 40) holed(c, r) = cairn::void_value;
+    const LoopResult with_holes = fly_loop(holed, {.seed = 4});
+    CHECK(with_holes.field_deviation == doctest::Approx(result.field_deviation).epsilon(0.02));
     CHECK(cairn_test::message_of([] {
             static_cast<void>(fly_loop(ground(6, 100, 100), {}));
           }).find("loop: expected a field of at least") != std::string::npos);

@@ -153,13 +153,18 @@ TEST_SUITE("terrain_file") {
       const cairn::FieldGrid grid = read_terrain(folder / "a.tif");
       REQUIRE(grid.columns() == 3);
       REQUIRE(grid.rows() == 2);
-      for (int i = 0; i < 6; ++i) CHECK(grid(i % 3, 1 - i / 3) == heights[static_cast<std::size_t>(i)]);
+      for (int i = 0; i < 6; ++i) {
+        const double found = grid(i % 3, 1 - i / 3), expected = heights[static_cast<std::size_t>(i)];
+        CHECK((found == expected || (std::isnan(found) && std::isnan(expected))));
+      }
     };
     const auto check_type = [&](auto first, std::uint16_t format) {
       using Number = decltype(first);
       const Number low = std::numeric_limits<Number>::lowest(), high = std::numeric_limits<Number>::max();
       const std::vector<Number> numbers{first, low, high, Number(3), Number(2), Number(1)};
-      const std::vector<double> heights(numbers.begin(), numbers.end());
+      std::vector<double> heights(numbers.begin(), numbers.end());
+      for (double& height : heights)  // what is no height of the Earth is a void
+        if (height < -12000 || height > 1e30) height = cairn::void_value;
       for (const bool big : {false, true}) {
         CAPTURE(big);
         CAPTURE(format);
@@ -176,8 +181,8 @@ TEST_SUITE("terrain_file") {
     check_type(std::uint16_t{40000}, 1);
     check_type(std::uint32_t{4000000000}, 1);
     check_type(std::int8_t{-100}, 2);
-    check_type(std::int16_t{-30000}, 2);
-    check_type(std::int32_t{-2000000000}, 2);
+    check_type(std::int16_t{-11000}, 2);
+    check_type(std::int32_t{2000000000}, 2);
     check_type(-0.25F, 3);
     check_type(1.0 / 3.0, 3);
   }
@@ -247,8 +252,26 @@ TEST_SUITE("terrain_file") {
       const cairn::FieldGrid grid = read_terrain(folder / "a.tif");
       for (int c = 0; c < 3; ++c) CHECK(std::isnan(grid(c, 1)));
       CHECK(grid(0, 0) == 1);
-      CHECK(std::isnan(grid(1, 0)) == (value == "-3.40282e+38"));  // as it is printed, not as a double
+      CHECK(std::isnan(grid(1, 0)));
+      CHECK(grid(2, 0) == 3);
     }
+  }
+
+  TEST_CASE("terrain_file: no-data values that the file does not name are voids, not cliffs") {
+    const Folder folder;
+    for (const float mark : {-9999.0F, -32767.0F, -32768.0F, -3.4028235e38F, 3.4028235e38F}) {
+      CAPTURE(mark);
+      folder.put("a.tif", small_tiff().without(42113).data<float>({mark, 2, 3, -10900, mark, 8848}).file());
+      const cairn::FieldGrid grid = read_terrain(folder / "a.tif");
+      CHECK(std::isnan(grid(0, 1)));
+      CHECK(std::isnan(grid(1, 0)));
+      CHECK(grid(0, 0) == -10900);  // the deepest sea and the highest mountain are heights
+      CHECK(grid(2, 0) == 8848);
+    }
+    // As GDAL prints it, with fewer digits than the float has: still that float.
+    folder.put("a.tif",
+               small_tiff().text(42113, std::string("0.1\0", 4)).data<float>({0.1F, 2, 3, 4, 5, 6}).file());
+    CHECK(std::isnan(read_terrain(folder / "a.tif")(0, 1)));
   }
 
   TEST_CASE("terrain_file: a GeoTIFF that claims what it cannot hold is refused before memory is taken") {
@@ -417,11 +440,14 @@ TEST_SUITE("terrain_file") {
     tile[0] = '\x01';  // 256 + 2 in the north-western corner
     tile[1] = '\x02';
     tile[2] = '\x80';  // -32768: void
+    tile[4] = '\x80';  // -32767: void
+    tile[5] = '\x01';
     folder.put("N59E010.hgt", tile);
     const cairn::FieldGrid srtm = read_terrain(folder / "N59E010.hgt");
     CHECK(srtm.columns() == 1201);
     CHECK(srtm(0, 1200) == 258.0);
     CHECK(std::isnan(srtm(1, 1200)));
+    CHECK(std::isnan(srtm(2, 1200)));
     CHECK(srtm.frame().dy == doctest::Approx(92.66).epsilon(0.001));
     CHECK(srtm.frame().dx == doctest::Approx(92.66 * std::cos(59.5 * 3.14159265 / 180)).epsilon(0.001));
     folder.put("a.pgm", std::string("P5 2 2 65535\n\0\1\0\2\1\0\0\4", 21));

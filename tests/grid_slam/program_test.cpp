@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: MIT
 //
 // The program as a user meets it: its exit code, its words and what it leaves behind.
+#include <algorithm>
 #include <csignal>
 #include <filesystem>
 #include <set>
 #include <string>
+#include <vector>
 
 #include <doctest/doctest.h>
 #include <nlohmann/json.hpp>
@@ -37,14 +39,16 @@ std::set<std::string> results() {
 }
 
 /// The first scans of a rendered drive as a CARMEN log; at scan `jump` odometry is elsewhere, by so many
-/// metres.
-std::string short_log(std::size_t scans, std::size_t jump = 0, double by = 0) {
+/// metres. Mirrored, beams run clockwise.
+std::string short_log(std::size_t scans, std::size_t jump = 0, double by = 0, bool mirrored = false) {
   const grid_slam::Drive drive = grid_slam::simulated_drive({.seed = 3});
   std::string text;
   for (std::size_t i = 0; i < scans; ++i) {
     const cairn::StampedScan& s = drive.log.scans[i];
     text += "FLASER " + std::to_string(s.scan.size());
-    for (const float r : s.scan.range) text += " " + cairn::shortest(r);
+    std::vector<float> ranges = s.scan.range;
+    if (mirrored) std::ranges::reverse(ranges);
+    for (const float r : ranges) text += " " + cairn::shortest(r);
     for (int twice = 0; twice < 2; ++twice)
       for (const double n : {s.T_odom_laser.x() + (jump > 0 && i == jump ? by : 0), s.T_odom_laser.y(),
                              s.T_odom_laser.angle()})
@@ -293,6 +297,17 @@ TEST_SUITE("grid_slam/program") {
     CHECK(run_with("log", relations("other")).says("none of the 1 relations has poses"));
     CHECK(run_with("log", relations("some")).says("1 of 2 relations have no pose"));
     CHECK(run_with("blind", "").says("no scan has a beam that came back"));
+  }
+
+  TEST_CASE("grid_slam: a mirrored scanner is a mistake, not a map") {
+    const cairn_test::Folder folder;
+    const std::size_t all = grid_slam::simulated_drive({.seed = 3}).log.scans.size();
+    folder.put("log", short_log(all, 0, 0, true));
+    const Outcome outcome = run("--particles 1 --log \"" + (folder / "log").string() + "\" --out \"" +
+                                (folder / "out").string() + "\"");
+    CHECK(outcome.code == 2);
+    CHECK(outcome.says("expected beams that run counter-clockwise"));
+    CHECK_FALSE(fs::exists(folder / "out"));
   }
 
   TEST_CASE("grid_slam: interrupted, it writes the scans until then") {

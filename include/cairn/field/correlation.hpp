@@ -22,13 +22,17 @@
 ///   - the residuals are white, and the odds are large; or
 ///   - whatever the residuals, the share of variance left unexplained, 1 - c^2, is far larger elsewhere
 ///     (the contrast, an F ratio).
-/// Smooth terrain resembles itself everywhere: a peak-to-sidelobe ratio (reported as well) says little.
+/// The best place is refined before it is judged, so the best of the others are refined too: on ground that
+/// repeats itself (dunes, terraces, a plantation) they are as good once they are, and bound odds and
+/// contrast. Smooth terrain resembles itself everywhere: a peak-to-sidelobe ratio (reported as well) says
+/// little.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <cairn/core/check.hpp>
@@ -95,7 +99,7 @@ struct Fix {
   FixVerdict verdict = FixVerdict::flat_map;
   PatchPlacement placement;                  ///< of the best place, refined below the spacing of the samples
   double peak = 0;                           ///< correlation there, -1..1
-  double second = 0;                         ///< best correlation elsewhere
+  double second = 0;                         ///< best correlation elsewhere, refined as well
   double contrast = 0;                       ///< (1 - second^2) / (1 - peak^2)
   double log_odds = 0;                       ///< (2) [nats]
   double residual_correlation = 1;           ///< of neighbouring samples, at the place; 0 for white noise
@@ -111,6 +115,8 @@ namespace detail {
 /// Best place of a bank of headings and scales: the surface it was found on, and the best of all surfaces.
 struct BankPeak {
   Plane surface, all;
+  std::vector<std::size_t> member;         // of the bank, that `all` is of
+  std::vector<PatchPlacement> placements;  // of the members, at the guess
   double peak = nothing;
   int column = 0, row = 0;
   PatchPlacement placement;  // of the member, at the guess
@@ -126,9 +132,13 @@ inline PatchPlacement turned(const PatchPlacement& p, double angle, double scale
           s * p.across_x + c * p.across_y};
 }
 
+/// The share of variance that a correlation leaves.
+inline double unexplained(double c) noexcept {
+  return std::max(1.0 - std::max(c, 0.0) * c, 1e-12);
+}
+
 /// Figures of confidence of the best place of a surface, which lies at (column, row); `samples` is n of (2).
 inline void judge(Fix& fix, const Plane& surface, int column, int row, double exclusion, double samples) {
-  const auto unexplained = [](double c) { return std::max(1.0 - std::max(c, 0.0) * c, 1e-12); };
   const double best = unexplained(surface(column, row));
   const double negligible = best * std::exp(80.0 / samples);  // beyond it a place has less than e^-40
   RunningMoments elsewhere;
@@ -158,13 +168,18 @@ BankPeak search_bank(const Map& map, const PatchShape& shape, const Plane& patch
                      const CorrelationSearchOptions& options, int reach_along, int reach_across, Fix& fix) {
   BankPeak best;
   best.all = Plane(2 * reach_along + 1, 2 * reach_across + 1, nothing);
+  best.member.resize(best.all.values.size());
   for (std::size_t h = 0; h < options.headings.size(); ++h)
     for (std::size_t s = 0; s < options.scales.size(); ++s) {
       const PatchPlacement placement = turned(guess, options.headings[h], options.scales[s]);
       Plane surface = correlation_surface(map_window(map, shape, placement, reach_along, reach_across), patch,
                                           options.smallest_share);
-      for (std::size_t i = 0; i < surface.values.size(); ++i)
-        best.all.values[i] = std::max(best.all.values[i], surface.values[i]);
+      for (std::size_t i = 0; i < surface.values.size(); ++i) {
+        if (!(surface.values[i] > best.all.values[i])) continue;
+        best.all.values[i] = surface.values[i];
+        best.member[i] = best.placements.size();
+      }
+      best.placements.push_back(placement);
       const auto top = std::max_element(surface.values.begin(), surface.values.end());
       if (!(*top > best.peak)) continue;
       best.peak = *top;
@@ -184,6 +199,17 @@ inline double sample_spacing(const PatchPlacement& p) noexcept {
   return std::min(std::hypot(p.along_x, p.along_y), std::hypot(p.across_x, p.across_y));
 }
 
+/// A placement moved by so many of its own steps.
+inline PatchPlacement shifted(PatchPlacement p, double along, double across) noexcept {
+  p.x += along * p.along_x + across * p.across_x;
+  p.y += along * p.along_y + across * p.across_y;
+  return p;
+}
+
+inline double distance(const PatchPlacement& a, const PatchPlacement& b) noexcept {
+  return std::hypot(a.x - b.x, a.y - b.y);
+}
+
 /// Refines the place on the map itself, where it does not lie on the rim of the region and the frame tells.
 template <FieldInterpolant Map>
 void refine(Fix& fix, const Map& map, const PatchShape& shape, std::span<const double> z,
@@ -195,18 +221,51 @@ void refine(Fix& fix, const Map& map, const PatchShape& shape, std::span<const d
     a += vertex(0);
     b -= vertex(1);
   }
-  fix.placement = best.placement;
-  fix.placement.x += a * best.placement.along_x + b * best.placement.across_x;
-  fix.placement.y += a * best.placement.along_y + b * best.placement.across_y;
+  fix.placement = shifted(best.placement, a, b);
   if (!interior) return;
   const auto refined = refined_placement(map, shape, z, fix.placement, options.scale_sigma,
                                          options.heading_sigma, options.smallest_share);
   if (!refined) return;
-  const double moved =
-      std::hypot(refined->placement.x - fix.placement.x, refined->placement.y - fix.placement.y);
-  if (!(moved <= options.exclusion * sample_spacing(fix.placement))) return;
+  if (!(distance(refined->placement, fix.placement) <= options.exclusion * sample_spacing(fix.placement)))
+    return;
   fix.placement = refined->placement;
   fix.covariance = refined->covariance;
+}
+
+/// Holds the best places elsewhere, each refined, against the one that was found. A place that lies between
+/// samples seems worse than one that lies on them; the smoother the ground and the more samples, the less of
+/// that it takes to look like certainty.
+template <FieldInterpolant Map>
+void judge_by_others(Fix& fix, const Map& map, const PatchShape& shape, std::span<const double> z,
+                     const BankPeak& best, double samples, const CorrelationSearchOptions& options) {
+  constexpr int others = 3;  // a lattice of equal hills has four around each
+  const double beside = options.exclusion * sample_spacing(fix.placement);
+  const Plane& all = best.all;
+  std::vector<std::pair<int, int>> taken{{best.column, best.row}};
+  for (int k = 0; k < others; ++k) {
+    double most = nothing;
+    std::pair<int, int> place;
+    for (int r = 0; r < all.rows; ++r)
+      for (int c = 0; c < all.columns; ++c)
+        if (all(c, r) > most && std::ranges::none_of(taken, [&](const std::pair<int, int>& t) {
+              return std::hypot(c - t.first, r - t.second) <= options.exclusion;
+            })) {
+          most = all(c, r);
+          place = {c, r};
+        }
+    if (most == nothing) return;
+    taken.push_back(place);
+    const auto [c, r] = place;
+    const std::size_t member = best.member[static_cast<std::size_t>(r * all.columns + c)];
+    const PatchPlacement start = shifted(best.placements[member], c - all.columns / 2, all.rows / 2 - r);
+    const auto refined = refined_placement(map, shape, z, start, options.scale_sigma, options.heading_sigma,
+                                           options.smallest_share);
+    // One that stands on the slope of the place that was found is led to that one's top.
+    if (!refined || distance(refined->placement, fix.placement) <= beside) continue;
+    fix.second = std::max(fix.second, patch_agreement(map, shape, z, refined->placement).correlation);
+  }
+  fix.contrast = unexplained(fix.second) / unexplained(fix.peak);
+  fix.log_odds = std::min(fix.log_odds, 0.5 * samples * std::log(fix.contrast));
 }
 
 /// The larger standard deviation of a place, in samples.
@@ -261,8 +320,9 @@ template <FieldInterpolant Map>
   fix.peak = std::max(agreement.correlation, best.peak);
   fix.residual_correlation = agreement.residual_correlation;
   fix.covariance /= agreement.independent_share;
-  detail::judge(fix, best.all, best.column, best.row, options.exclusion,
-                agreement.independent_share * static_cast<double>(z.size()));
+  const double samples = agreement.independent_share * static_cast<double>(z.size());
+  detail::judge(fix, best.all, best.column, best.row, options.exclusion, samples);
+  detail::judge_by_others(fix, map, shape, z, best, samples, options);
   fix.verdict = detail::verdict_of(fix, interior, options);
   return fix;
 }
