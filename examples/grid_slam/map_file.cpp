@@ -10,6 +10,7 @@
 #include <functional>
 #include <limits>
 #include <map>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -113,7 +114,11 @@ struct TileStore {
     auto& numbers = of_grid.emplace_back();
     grid.for_each_tile([&](cairn::TileAddress address, const auto& tile) {
       const auto [place, fresh] = known_.try_emplace(&tile, static_cast<std::uint32_t>(tiles.size()));
-      if (fresh) tiles.push_back({address, {tile.begin(), tile.end()}});
+      if (fresh) {
+        std::vector<Cell>& cells = tiles.emplace_back(Tile{address, {}}).cells;
+        cells.reserve(cairn::tile_cells);
+        for (std::size_t k = 0; k < cairn::tile_cells; ++k) cells.push_back(tile[k]);
+      }
       numbers.push_back(place->second);
     });
   }
@@ -124,11 +129,8 @@ struct TileStore {
     for (std::size_t i = 0; i < tiles.size(); ++i) {
       if (tiles[i].cells.size() != cairn::tile_cells) reader.refuse("a tile of the map has another size");
       if (!std::ranges::all_of(tiles[i].cells, possible)) reader.refuse("a cell has more hits than visits");
-      auto& tile = single[i].writable_tile(tiles[i].address);
-      for (std::size_t k = 0; k < tiles[i].cells.size(); ++k) {
-        tile[k] = tiles[i].cells[k];
-        tile.mark(k);
-      }
+      single[i].writable_tile(tiles[i].address) = typename cairn::SharedTiles<Cell>::Tile(
+          std::span(tiles[i].cells).template first<cairn::tile_cells>());
     }
     for (std::size_t g = 0; g < all.size(); ++g)
       for (const std::uint32_t number : of_grid[g]) {

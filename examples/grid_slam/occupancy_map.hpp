@@ -14,6 +14,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <vector>
@@ -252,7 +253,7 @@ private:
         for (int x = -nx; x <= nx; ++x) {
           const cairn::SE2 pose =
               cairn::retract(motion.mean, cairn::Vector<3>(reach * x, reach * y, turn * a));
-          first.add({ranking.worth(pose), pose});
+          first.add({ranking.worth(pose, first.least()), pose});
         }
     }
     cairn::SE2 best = motion.mean;
@@ -275,8 +276,12 @@ private:
   struct FirstFew {
     static constexpr std::size_t most = 12;
     std::vector<Ranked> all;
+    /// What is worth no more is not among them.
+    [[nodiscard]] float least() const {
+      return all.size() < most ? -std::numeric_limits<float>::infinity() : all.back().worth;
+    }
     void add(const Ranked& next) {
-      if (all.size() == most && !(next.worth > all.back().worth)) return;
+      if (!(next.worth > least())) return;
       if (all.size() == most) all.pop_back();
       const auto place = std::ranges::upper_bound(all, next.worth, std::ranges::greater{}, &Ranked::worth);
       all.insert(place, next);
@@ -303,13 +308,16 @@ private:
       for (std::size_t i = 0; i < points_.size(); ++i)
         turned_[i] = {c * points_[i].x - s * points_[i].y, s * points_[i].x + c * points_[i].y};
     }
-    [[nodiscard]] float worth(const cairn::SE2& pose) {
+    /// What a pose is worth; of one worth no more than `least`, some number that is no more than that either:
+    /// each point takes away from it.
+    [[nodiscard]] float worth(const cairn::SE2& pose, float least) {
       const double column = geometry_.column_of(pose.x()), row = geometry_.row_of(pose.y());
       float sum = 0;
       for (const cairn::ScanPoint& p : turned_) {
         const double x = column + p.x, y = row + p.y;
         const bool has_cell = std::abs(x) < cairn::farthest_cell && std::abs(y) < cairn::farthest_cell;
         sum += worth_[has_cell ? static_cast<std::size_t>(rings_.around({whole(x), whole(y)})) : 0];
+        if (!(sum > least)) break;
       }
       return sum;
     }

@@ -273,7 +273,7 @@ std::size_t map_bytes(const Mapper::Belief& belief) {
   std::set<const void*> seen;
   std::size_t bytes = 0;
   const auto count = [&](cairn::TileAddress, const auto& tile) {
-    if (seen.insert(&tile).second) bytes += sizeof tile;
+    if (seen.insert(&tile).second) bytes += tile.bytes();
   };
   for (std::size_t i = 0; i < belief.size(); ++i) {
     belief[i].map.grid.cells().for_each_tile(count);
@@ -296,7 +296,7 @@ Snapshot snapshot_of(const Mapper& mapper) {
   for (const auto& pose : belief.path(best)) s.best.push_back(pose.pose);
   for (std::size_t i = 0; i < belief.size(); ++i)
     belief[i].map.grid.cells().for_each_tile(
-        [&](cairn::TileAddress, const auto& tile) { s.separate_bytes += sizeof tile; });
+        [&](cairn::TileAddress, const auto& tile) { s.separate_bytes += tile.bytes(); });
   return s;
 }
 

@@ -153,6 +153,35 @@ TEST_SUITE("grid/distance_field") {
       }
   }
 
+  TEST_CASE("distance_field: asked here and there over a wide map it answers as a field that is new") {
+    const std::uint64_t seed = cairn_test::seed(6);
+    CAPTURE(seed);
+    Random random(seed);
+    Scattered all;  // in 3 x 3 tiles of every sixteenth, which are remembered at one place
+    for (int i = 0; i < 9000; ++i) {
+      const auto any = [&] {
+        return static_cast<std::int32_t>(random.uniform(0, 3)) * 16 * tile_side +
+               static_cast<std::int32_t>(std::floor(random.uniform(-16, 48)));
+      };
+      all.put({any(), any()}, random.uniform(0, 0.999), random.uniform(0, 0.999));
+    }
+    DistanceField<Spot> field(all.grid, 6);
+    std::size_t found = 0;
+    for (int i = 0; i < 3000; ++i) {
+      const auto any = [&] {
+        return static_cast<std::int32_t>(random.uniform(0, 3)) * 16 * tile_side +
+               static_cast<std::int32_t>(random.uniform(0, 32));
+      };
+      const CellAddress cell{any(), any()};
+      DistanceField<Spot> fresh(all.grid, 6);
+      const NearestObstacle expected = fresh.at(cell);
+      REQUIRE(field.at(cell) == expected);
+      REQUIRE(field.cell(cell).x == all.grid.read(cell).x);
+      found += expected.has_line();
+    }
+    CHECK(found > 100);
+  }
+
   TEST_CASE("distance_field: a radius that it cannot search is refused in words") {
     const SharedTiles<Spot> none;
     for (const double radius : {0.0, -1.0, 16.5, std::nan("")})

@@ -68,6 +68,26 @@ TEST_SUITE("grid/ray") {
     }
   }
 
+  TEST_CASE("ray: a border that is crossed by less than any slope has a number for is one border") {
+    for (const double across : {1e-320, 1e-308, 1e-300, 1e-17})
+      for (const double from : {-3.5, 2.25, 0.0})
+        for (const double to : {7.5, -8.0, 3.0})
+          for (const double side : {1.0, -1.0}) {
+            const double y0 = side > 0 ? -across : 0.0, y1 = side > 0 ? across : -across;
+            std::vector<CellAddress> cells, by_rows, by_columns;
+            walk_cells(from, y0, to, y1, [&](CellAddress cell) { cells.push_back(cell); });
+            walk_rows(from, y0, to, y1, [&](std::int32_t row, std::int32_t first, std::int32_t last) {
+              for (std::int32_t column = first; column <= last; ++column) by_rows.push_back({column, row});
+            });
+            walk_columns(y0, from, y1, to, [&](std::int32_t column, std::int32_t first, std::int32_t last) {
+              for (std::int32_t row = first; row <= last; ++row) by_columns.push_back({row, column});
+            });
+            for (auto* all : {&cells, &by_rows}) std::ranges::sort(*all);
+            REQUIRE(by_rows == cells);
+            REQUIRE(by_columns.size() == cells.size());
+          }
+  }
+
   TEST_CASE("ray: the cells and lengths are those that clipping every cell of the box gives") {
     const std::uint64_t seed = cairn_test::seed();
     CAPTURE(seed);

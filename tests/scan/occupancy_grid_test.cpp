@@ -1,7 +1,10 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
 #include <cmath>
+#include <cstddef>
+#include <cstdint>
 #include <map>
+#include <span>
 #include <vector>
 
 #include <doctest/doctest.h>
@@ -116,6 +119,55 @@ TEST_SUITE("scan/occupancy_grid") {
     });
     CHECK(obstacles > 100);
     CHECK(free > 1000);
+  }
+
+  TEST_CASE("occupancy_grid: a tile counts its cells as an array of them does, past 255 visits too") {
+    const std::uint64_t seed = cairn_test::seed(4);
+    CAPTURE(seed);
+    Random random(seed);
+    OccupancyTile tile;
+    std::vector<OccupancyCell> plain(tile_cells);
+    const auto draw = [&] { return static_cast<std::uint32_t>(random.uniform(0, 4294967296.0)); };
+    for (int step = 0; step < 20000; ++step) {
+      const auto row = static_cast<std::size_t>(random.uniform(0, tile_side));
+      const std::uint32_t passed = row == 7 ? 0xffffffffU : draw() | draw();
+      // Of some rows no cell is ever hit, of one the first and the last alone.
+      const std::uint32_t often = draw() & draw(), seldom = row % 3 == 1 ? often & draw() : often;
+      const std::uint32_t stopped = row % 3 == 0 ? 0 : row == 1 ? draw() & 0x80000001U : seldom;
+      tile.count(row, passed, stopped & passed);
+      for (std::size_t column = 0; column < tile_side; ++column) {
+        if ((passed >> column & 1U) == 0) continue;
+        OccupancyCell& cell = plain[row * tile_side + column];
+        if (cell.visits == 255) {
+          cell.visits = 128;
+          cell.hits = static_cast<std::uint8_t>((cell.hits + 1) / 2);
+        }
+        ++cell.visits;
+        if ((stopped >> column & 1U) == 0) continue;
+        ++cell.hits;
+        const double x = random.uniform(0, 1), y = random.uniform(0, 1);
+        tile.move_mean(row * tile_side + column, x, y);
+        cell.mean_x =
+            static_cast<std::uint16_t>(std::lrint(cell.mean_x + (65535 * x - cell.mean_x) / cell.hits));
+        cell.mean_y =
+            static_cast<std::uint16_t>(std::lrint(cell.mean_y + (65535 * y - cell.mean_y) / cell.hits));
+      }
+    }
+    std::size_t obstacles = 0, halved = 0;
+    for (std::size_t i = 0; i < tile_cells; ++i) {
+      CAPTURE(i);
+      REQUIRE(tile[i] == plain[i]);
+      REQUIRE(plain[i].is_obstacle() == ((tile.obstacles[i / 32] >> (i % 32) & 1U) != 0));
+      obstacles += plain[i].is_obstacle();
+      halved += plain[i].hits > 0 && plain[i].visits >= 128;
+    }
+    CHECK(obstacles > 20);
+    CHECK(obstacles < 900);
+    CHECK(halved > 200);
+    const OccupancyTile again{std::span(plain).first<tile_cells>()};
+    CHECK(again == tile);
+    CHECK(again.bytes() == tile.bytes());  // though it was filled otherwise
+    CHECK(OccupancyTile().bytes() < tile.bytes());
   }
 
   TEST_CASE("occupancy_grid: the normal of a wall is across it, and a lone point has none") {

@@ -67,7 +67,11 @@ public:
 
   /// A field that looks `radius` cells far, above 0 and at most 16. Throws Error.
   DistanceField(const SharedTiles<Cell>& cells, double radius)
-      : cells_(&cells), radius_(static_cast<float>(radius)), nearest_(slots), normals_(slots / 4) {
+      : cells_(&cells),
+        radius_(static_cast<float>(radius)),
+        reach_(static_cast<int>(std::ceil(std::clamp(radius, double{normal_reach}, largest_radius)))),
+        nearest_(slots),
+        normals_(slots / 4) {
     expect_radius(radius);
   }
 
@@ -77,13 +81,12 @@ public:
   /// where it was asked before, else O(distance^2). Valid until the next question.
   [[nodiscard]] const NearestObstacle& at(CellAddress cell) {
     auto& slot = nearest_[place(cell, slots)];
-    if (slot.cell != cell) slot = {cell, searched(cell)};
+    if (slot.key != key_of(cell)) slot = {key_of(cell), searched(cell)};
     return slot.value;
   }
   /// The grid's cell.
-  [[nodiscard]] const Cell& cell(CellAddress address) {
-    look_around(address);
-    return read(address);
+  [[nodiscard]] typename SharedTiles<Cell>::CellRead cell(CellAddress address) {
+    return around(tile_of(address)).read(address);
   }
 
 private:
@@ -93,9 +96,14 @@ private:
   };
   template <class Value>
   struct Slot {
-    CellAddress cell{std::numeric_limits<std::int32_t>::min(), 0};  // which is no cell
+    std::uint64_t key = 0;  // of no cell
     Value value{};
   };
+  /// One number for a cell, and never 0.
+  [[nodiscard]] static std::uint64_t key_of(CellAddress cell) noexcept {
+    const std::uint32_t column = static_cast<std::uint32_t>(cell.column) ^ 0x80000000U;
+    return std::uint64_t{column} << 32U | static_cast<std::uint32_t>(cell.row);
+  }
 
   [[nodiscard]] static std::uint32_t place(CellAddress cell, std::uint32_t count) noexcept {
     const std::uint32_t mixed = static_cast<std::uint32_t>(cell.column) * 0x9e3779b1U +
@@ -103,58 +111,82 @@ private:
     return (mixed >> 16U) & (count - 1);
   }
 
-  /// Makes the tiles around a cell those that read() looks into.
-  void look_around(CellAddress cell) {
-    const TileAddress middle = tile_of(cell);
-    if (looked_ && middle == middle_) return;
-    looked_ = true;
-    middle_ = middle;
-    for (std::int32_t k = 0; k < 9; ++k)
-      around_[static_cast<std::size_t>(k)] =
-          cells_->tile({middle.column + k % 3 - 1, middle.row + k / 3 - 1});
-  }
-  /// A cell of the tiles around.
-  [[nodiscard]] const Cell& read(CellAddress cell) const noexcept {
-    const TileAddress tile = tile_of(cell);
-    const auto* found = around_[static_cast<std::size_t>((tile.row - middle_.row + 1) * 3 +
-                                                         (tile.column - middle_.column + 1))];
-    return found == nullptr ? blank : (*found)[place_in_tile(cell)];
-  }
+  /// A tile, its neighbours, and their obstacles row by row: bit 16 + k of a word for the tile's column k.
+  struct Around {
+    TileAddress middle;
+    std::array<const typename SharedTiles<Cell>::Tile*, 9> tiles{};
+    std::array<std::uint64_t, 2 * tile_side> rows;  // from 16 below the tile on
 
-  /// The obstacles of the row that is `row` above a cell's: bit 16 + k for the one k columns to the right.
-  [[nodiscard]] std::uint64_t obstacles_beside(CellAddress cell, int row) const noexcept {
-    const std::int32_t at = cell.row + row;
-    const auto tiles = static_cast<std::size_t>(((at >> 5) - middle_.row + 1) * 3);
-    const auto bits = [&](std::size_t k) -> std::uint64_t {
-      const auto* tile = around_[tiles + k];
-      return tile == nullptr ? 0 : tile->obstacles[static_cast<std::size_t>(at & 31)];
-    };
-    const auto k = static_cast<std::size_t>((cell.column >> 5) - middle_.column + 1);
-    const auto column = static_cast<std::uint32_t>(cell.column & 31);
-    return column < 16 ? (k == 0 ? 0 : bits(k - 1) >> (16 + column)) | bits(k) << (16 - column)
-                       : bits(k) >> (column - 16) | (k == 2 ? 0 : bits(k + 1) << (48 - column));
+    /// A cell of these tiles.
+    [[nodiscard]] typename SharedTiles<Cell>::CellRead read(CellAddress cell) const noexcept {
+      const TileAddress tile = tile_of(cell);
+      const auto* found = tiles[static_cast<std::size_t>((tile.row - middle.row + 1) * 3 +
+                                                         (tile.column - middle.column + 1))];
+      return found == nullptr ? blank : (*found)[place_in_tile(cell)];
+    }
+    /// The obstacles of the row that is `row` above a cell's of the tile: bit 16 + k for the one k columns to
+    /// the right.
+    [[nodiscard]] std::uint64_t obstacles_beside(CellAddress cell, int row) const noexcept {
+      return rows[static_cast<std::size_t>((cell.row & 31) + row + 16)] >> (cell.column & 31);
+    }
+  };
+
+  /// Valid until the next question.
+  [[nodiscard]] const Around& around(TileAddress middle) {
+    if (here_ < around_.size() && around_[here_].middle == middle) return around_[here_];
+    std::uint16_t& known = known_[static_cast<std::size_t>((middle.column & 15) + 16 * (middle.row & 15))];
+    if (known == 0) {
+      around_.emplace_back();
+      known = static_cast<std::uint16_t>(around_.size());
+    } else if (around_[known - 1U].middle == middle) {
+      return around_[here_ = known - 1U];
+    }
+    here_ = known - 1U;
+    look_around(middle, around_[here_]);
+    return around_[here_];
   }
-  /// Calls visit(column, x, y) for the points of the row `row` above the cell's and up to `reach` columns
-  /// from it, seen from the cell's lower corner.
+  void look_around(TileAddress middle, Around& out) const {
+    out.middle = middle;
+    for (std::int32_t k = 0; k < 9; ++k)
+      out.tiles[static_cast<std::size_t>(k)] =
+          cells_->tile({middle.column + k % 3 - 1, middle.row + k / 3 - 1});
+    static constexpr ObstacleBits none{};
+    const auto join = [&](std::size_t tiles, int first, int last, std::size_t to) {
+      const auto bits = [&](std::size_t k) -> const ObstacleBits& {
+        return out.tiles[3 * tiles + k] == nullptr ? none : out.tiles[3 * tiles + k]->obstacles;
+      };
+      const ObstacleBits &left = bits(0), &own = bits(1), &right = bits(2);
+      for (auto row = static_cast<std::size_t>(first); row < static_cast<std::size_t>(last); ++row)
+        out.rows[to++] = std::uint64_t{left[row]} >> 16U | std::uint64_t{own[row]} << 16U |
+                         std::uint64_t{right[row]} << 48U;
+    };
+    join(0, tile_side - reach_, tile_side, static_cast<std::size_t>(16 - reach_));
+    join(1, 0, tile_side, 16);
+    join(2, 0, reach_, 16 + tile_side);
+  }
+  /// Calls visit(column, x, y) for the points of the row `row` above the cell's in the columns from it whose
+  /// bit 16 + column is set in `window`, seen from the cell's lower corner.
   template <class Visit>
-  void points_of_row(CellAddress cell, int row, int reach, const Visit& visit) const {
-    const std::uint64_t window = (std::uint64_t{2} << static_cast<unsigned>(2 * reach)) - 1;
-    std::uint64_t left = obstacles_beside(cell, row) & window << static_cast<unsigned>(16 - reach);
-    for (; left != 0; left &= left - 1) {
+  static void points_of_row(const Around& here, CellAddress cell, int row, std::uint64_t window,
+                            const Visit& visit) {
+    for (std::uint64_t left = here.obstacles_beside(cell, row) & window; left != 0; left &= left - 1) {
       const int column = std::countr_zero(left) - 16;
-      const Cell& c = read({cell.column + column, cell.row + row});
+      const auto& c = here.read({cell.column + column, cell.row + row});
       visit(column, static_cast<float>(column) + c.point_x(), static_cast<float>(row) + c.point_y());
     }
   }
+  /// The columns up to `reach` from a cell.
+  [[nodiscard]] static std::uint64_t window_of(int reach) noexcept {
+    return ((std::uint64_t{2} << static_cast<unsigned>(2 * reach)) - 1) << static_cast<unsigned>(16 - reach);
+  }
 
   [[nodiscard]] NearestObstacle searched(CellAddress cell) {
-    look_around(cell);
+    const Around& here = around(tile_of(cell));
     NearestObstacle best;
     CellAddress of_best{};
     float least = radius_ * radius_;
-    int reach = static_cast<int>(std::ceil(radius_));
-    const auto search_row = [&](int row) {
-      points_of_row(cell, row, reach, [&](int column, float x, float y) {
+    const auto search_row = [&](int row, std::uint64_t window) {
+      points_of_row(here, cell, row, window, [&](int column, float x, float y) {
         const float dx = x - 0.5F, dy = y - 0.5F, squared = dx * dx + dy * dy;
         const CellAddress at{cell.column + column, cell.row + row};
         const bool before = at.row < of_best.row || (at.row == of_best.row && at.column < of_best.column);
@@ -164,15 +196,26 @@ private:
         of_best = at;
       });
     };
-    search_row(0);
-    for (int row = 1; row <= reach; ++row) {  // no point there is nearer than half a cell less than its row
-      search_row(-row);
-      search_row(row);
+    // No point is nearer than half a cell less than its row and its column: the nearest cells come first, and
+    // what they leave is a smaller square, and of its rows a shorter part the farther they are.
+    int reach = static_cast<int>(std::ceil(radius_));
+    const auto out_of_reach = [&](int column, int row) {
+      return squared_of(static_cast<float>(column) - 0.5F) + squared_of(static_cast<float>(row) - 0.5F) >
+             least;
+    };
+    const std::uint64_t beside = window_of(1);
+    search_row(0, beside);
+    while (reach > 0 && squared_of(static_cast<float>(reach) - 0.5F) > least) --reach;
+    search_row(0, window_of(reach) & ~beside);
+    for (int row = 1, column = reach; row <= reach; ++row) {
+      while (column > 0 && out_of_reach(column, row)) --column;
+      search_row(-row, window_of(column));
+      search_row(row, window_of(column));
       while (reach > row && squared_of(static_cast<float>(reach) - 0.5F) > least) --reach;
     }
     if (!best.found) return best;
     auto& slot = normals_[place(of_best, slots / 4)];
-    if (slot.cell != of_best) slot = {of_best, normal_at(of_best)};
+    if (slot.key != key_of(of_best)) slot = {key_of(of_best), normal_at(of_best)};
     best.normal_x = slot.value.x;
     best.normal_y = slot.value.y;
     return best;
@@ -180,11 +223,12 @@ private:
   [[nodiscard]] static float squared_of(float x) noexcept { return x * x; }
 
   /// Across the line through an obstacle and its neighbours: the direction in which they spread least.
-  [[nodiscard]] Normal normal_at(CellAddress cell) const {
-    const Cell& middle = read(cell);
+  [[nodiscard]] Normal normal_at(CellAddress cell) {
+    const Around& here = around(tile_of(cell));
+    const auto& middle = here.read(cell);
     float n = 0, sx = 0, sy = 0, sxx = 0, sxy = 0, syy = 0;
     for (int row = -normal_reach; row <= normal_reach; ++row)
-      points_of_row(cell, row, normal_reach, [&](int, float at_x, float at_y) {
+      points_of_row(here, cell, row, window_of(normal_reach), [&](int, float at_x, float at_y) {
         const float x = at_x - middle.point_x(), y = at_y - middle.point_y();
         n += 1;
         sx += x;
@@ -212,11 +256,12 @@ private:
   static inline const Cell blank{};
   const SharedTiles<Cell>* cells_;
   float radius_;
+  int reach_;  // cells beyond a tile that are looked at
   std::vector<Slot<NearestObstacle>> nearest_;
   std::vector<Slot<Normal>> normals_;
-  std::array<const typename SharedTiles<Cell>::Tile*, 9> around_{};
-  TileAddress middle_{};
-  bool looked_ = false;
+  std::vector<Around> around_;
+  std::array<std::uint16_t, 256> known_{};  // by the tile's address: one more than its place in around_
+  std::size_t here_ = 0;
 };
 
 }}  // namespace cairn::CAIRN_ABI

@@ -121,17 +121,20 @@ void walk_runs(double along0, double across0, double along1, double across1, con
   const std::int32_t step_across = last_across < across ? -1 : 1,
                      border_across = last_across < across ? 0 : 1;
   const std::int32_t low = std::min(from, last), high = std::max(from, last);
-  for (; across != last_across; across += step_across) {
-    const double until = border_at(across, border_across, across0, inverse_across);
-    const auto crossed = [&](std::int32_t cell) {
-      return passes(border_at(cell, border, along0, inverse), until);
-    };
-    const double place = along0 + until * (along1 - along0);
+  const double slope = (along1 - along0) * inverse_across;
+  const bool finite = std::isfinite(slope);       // not where a ray is level but for less than 1e-300 cells
+  double way = across + border_across - across0;  // across, to the next border: exact, step by step
+  for (; across != last_across; across += step_across, way += step_across) {
+    const auto until = [&] { return border_at(across, border_across, across0, inverse_across); };
+    const double place = along0 + (finite ? way * slope : until() * (along1 - along0));
     auto to = static_cast<std::int32_t>(place);
-    if (place < to) --to;
+    to -= static_cast<std::int32_t>(place < to);
     // Rounding decides as it does cell by cell, where it decides at all.
-    constexpr double unsure = 1e-5;  // cells; 2^28 of them leave 6e-8
-    if (const double beyond = place - to; beyond < unsure || beyond > 1 - unsure) {
+    constexpr double unsure = 1e-5;  // cells; 2^28 of them leave 3e-7
+    if (std::abs(place - to - 0.5) > 0.5 - unsure) [[unlikely]] {
+      const auto crossed = [&, at = until()](std::int32_t cell) {
+        return passes(border_at(cell, border, along0, inverse), at);
+      };
       to = std::clamp(to, low, high);
       if ((to - from) * step < 0) to = from;
       while (to != last && crossed(to)) to += step;

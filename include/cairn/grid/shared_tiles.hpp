@@ -15,6 +15,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -26,7 +27,8 @@
 namespace cairn { inline namespace CAIRN_ABI {
 
 /// What a tile of such cells is: an array of them, row by row. A specialisation may keep more beside the
-/// cells, which read and write like an array's.
+/// cells, which read and write like an array's, or keep them in another way: its [] then gives them by value,
+/// and they are written by what writable_tile() has for it.
 template <class Cell>
 struct TileOf {
   using type = std::array<Cell, tile_cells>;
@@ -36,14 +38,22 @@ template <class Cell>
 class SharedTiles {
 public:
   using Tile = typename TileOf<Cell>::type;
+  /// A cell that is read: by reference where the tile has it as such.
+  using CellRead = decltype(std::declval<const Tile&>()[std::size_t{}]);
+  static constexpr bool has_references =
+      std::is_same_v<decltype(std::declval<Tile&>()[std::size_t{}]), Cell&>;
 
   /// The cell, or Cell{} where nothing was written. Two loads and a comparison from the tile's own.
-  [[nodiscard]] const Cell& read(CellAddress cell) const noexcept {
+  [[nodiscard]] CellRead read(CellAddress cell) const noexcept {
     const Tile* found = tile(tile_of(cell));
     return found == nullptr ? blank : (*found)[place_in_tile(cell)];
   }
   /// The cell of this grid alone. Throws Error where the grid would be wider than 2^16 tiles.
-  [[nodiscard]] Cell& write(CellAddress cell) { return writable_tile(tile_of(cell))[place_in_tile(cell)]; }
+  [[nodiscard]] Cell& write(CellAddress cell)
+    requires has_references
+  {
+    return writable_tile(tile_of(cell))[place_in_tile(cell)];
+  }
 
   /// The tile, or null where nothing was written.
   [[nodiscard]] const Tile* tile(TileAddress address) const noexcept {
@@ -79,7 +89,7 @@ public:
   class Reader {
   public:
     explicit Reader(const SharedTiles& grid) noexcept : grid_(&grid) {}
-    [[nodiscard]] const Cell& operator()(CellAddress cell) noexcept {
+    [[nodiscard]] CellRead operator()(CellAddress cell) noexcept {
       if (const TileAddress address = tile_of(cell); !any_ || address != address_) {
         any_ = true;
         address_ = address;
@@ -101,12 +111,18 @@ public:
   public:
     explicit Writer(SharedTiles& grid) noexcept : grid_(&grid) {}
     /// Throws Error as write() does.
-    [[nodiscard]] Cell& operator()(CellAddress cell) {
-      if (const TileAddress address = tile_of(cell); tile_ == nullptr || address != address_) {
+    [[nodiscard]] Cell& operator()(CellAddress cell)
+      requires has_references
+    {
+      return tile(tile_of(cell))[place_in_tile(cell)];
+    }
+    /// The same, of a tile.
+    [[nodiscard]] Tile& tile(TileAddress address) {
+      if (tile_ == nullptr || address != address_) {
         tile_ = &grid_->writable_tile(address);
         address_ = address;
       }
-      return (*tile_)[place_in_tile(cell)];
+      return *tile_;
     }
 
   private:

@@ -127,16 +127,23 @@ public:
     found_ = false;
     const int top = static_cast<int>(levels_.size()) - 1, side = 1 << top;
     for (int y = -reach_y_; y <= reach_y_; y += side)
-      for (int x = -reach_x_; x <= reach_x_; x += side) descend(top, x, y, bound(top, x, y), best, where);
+      for (int x = -reach_x_; x <= reach_x_; x += side)
+        descend(top, x, y, bound(top, x, y, best), best, where);
     return found_;
   }
 
 private:
-  [[nodiscard]] long bound(int level, int x, int y) const {
+  /// No translation of a square has more. Where that is no more than `best`, some number that is not either:
+  /// what is left of the points is not looked at once it cannot raise the sum so far.
+  [[nodiscard]] long bound(int level, int x, int y, long best) const {
     const ScoreGrid& grid = levels_[static_cast<std::size_t>(level)];
     const int margin = (1 << level) - 1;
-    long sum = 0;
-    for (const auto& [column, row] : cells_) sum += grid.at(column + x + margin, row + y + margin);
+    constexpr long most = 255;
+    long sum = most * static_cast<long>(cells_.size());
+    for (const auto& [column, row] : cells_) {
+      sum -= most - grid.at(column + x + margin, row + y + margin);
+      if (sum <= best) break;
+    }
     return sum;
   }
 
@@ -160,7 +167,7 @@ private:
     for (const int dy : {0, half})
       for (const int dx : {0, half}) {
         if (x + dx > reach_x_ || y + dy > reach_y_) continue;
-        const Child child{x + dx, y + dy, bound(level - 1, x + dx, y + dy)};
+        const Child child{x + dx, y + dy, bound(level - 1, x + dx, y + dy, best)};
         std::size_t place = count++;
         for (; place > 0 && children[place - 1].upper < child.upper; --place)
           children[place] = children[place - 1];

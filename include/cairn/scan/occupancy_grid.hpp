@@ -17,6 +17,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -49,23 +51,135 @@ struct OccupancyCell {
   friend bool operator==(const OccupancyCell&, const OccupancyCell&) = default;
 };
 
-/// A tile of such cells, and which of them are obstacles.
-struct OccupancyTile {
-  std::array<OccupancyCell, tile_cells> cells{};
-  ObstacleBits obstacles{};
+/// A tile of such cells, and which of them are obstacles. Most cells never stop a beam, so that a cell is a
+/// byte of visits, and only those that did stop one have hits and a mean point, in the order of the cells: a
+/// quarter of the memory, and a scan is counted in eight cells at once.
+class OccupancyTile {
+public:
+  ObstacleBits obstacles{};  ///< what the cells' is_obstacle() says; to be read only
 
-  [[nodiscard]] OccupancyCell& operator[](std::size_t place) noexcept { return cells[place]; }
-  [[nodiscard]] const OccupancyCell& operator[](std::size_t place) const noexcept { return cells[place]; }
-  [[nodiscard]] auto begin() const noexcept { return cells.begin(); }
-  [[nodiscard]] auto end() const noexcept { return cells.end(); }
-
-  /// Makes the bit of a cell what the cell is.
-  void mark(std::size_t place) noexcept {
-    const std::uint32_t bit = std::uint32_t{1} << (place % tile_side);
-    std::uint32_t& row = obstacles[place / tile_side];
-    row = cells[place].is_obstacle() ? row | bit : row & ~bit;
+  OccupancyTile() = default;
+  /// Of these cells, row by row.
+  explicit OccupancyTile(std::span<const OccupancyCell, tile_cells> cells) {
+    for (std::size_t place = 0; place < tile_cells; ++place) {
+      visits_[place] = cells[place].visits;
+      if (cells[place].hits == 0) continue;
+      Hits& hits = added(place);
+      hits = {cells[place].hits, cells[place].mean_x, cells[place].mean_y};
+      if (cells[place].is_obstacle()) obstacles[place / tile_side] |= bit(place);
+    }
   }
+
+  [[nodiscard]] OccupancyCell operator[](std::size_t place) const noexcept {
+    if ((ever_hit_[place / tile_side] & bit(place)) == 0) return {.visits = visits_[place]};
+    const Hits& hits = hits_[rank(place)];
+    return {visits_[place], hits.count, hits.mean_x, hits.mean_y};
+  }
+  /// Counts a visit in the cells of a row whose bit is set in `passed`, and a hit where `stopped` has it too.
+  /// O(1), and O(cells hit) where a cell is hit for the first time.
+  void count(std::size_t row, std::uint32_t passed, std::uint32_t stopped) {
+    for (std::size_t column = 0; column < tile_side; column += 8) {
+      const std::uint64_t ones = spread(passed >> column & 255U);
+      std::uint8_t* const eight = &visits_[row * tile_side + column];
+      if (any_full(load_eight(eight), ones)) halve(row * tile_side + column, passed >> column & 255U);
+      const std::uint64_t counted = load_eight(eight) + ones;
+      std::memcpy(eight, &counted, sizeof counted);
+    }
+    for (std::uint32_t left = stopped & ~ever_hit_[row]; left != 0; left &= left - 1)
+      added(first_of(row, left));
+    // Bytes may be any object's to a compiler: what they leave as it is stands in variables of its own.
+    const std::uint32_t ever_hit = ever_hit_[row];
+    std::uint32_t left = passed & ever_hit, is_obstacle = obstacles[row];
+    if (left == 0) return;
+    Hits* const hits = hits_.data() + before_row_[row];
+    for (; left != 0; left &= left - 1) {
+      const std::uint32_t lowest = left & (~left + 1);
+      Hits& of_cell = hits[ones_in(ever_hit & (lowest - 1))];
+      if ((stopped & lowest) != 0) ++of_cell.count;
+      const OccupancyCell cell{visits_[first_of(row, left)], of_cell.count};
+      is_obstacle = cell.is_obstacle() ? is_obstacle | lowest : is_obstacle & ~lowest;
+    }
+    obstacles[row] = is_obstacle;
+  }
+  /// Moves the mean point of a cell that was hit towards a point, from the cell's lower corner [cells].
+  void move_mean(std::size_t place, double x, double y) noexcept {
+    CAIRN_ASSERT((ever_hit_[place / tile_side] & bit(place)) != 0, "move_mean needs a cell that was hit");
+    Hits& hits = hits_[rank(place)];
+    const auto moved = [&](std::uint16_t& mean, double fraction) {
+      const double before = mean, target = 65535.0 * fraction;
+      mean =
+          static_cast<std::uint16_t>(std::lrint(before + (target - before) / std::max<int>(1, hits.count)));
+    };
+    moved(hits.mean_x, x);
+    moved(hits.mean_y, y);
+  }
+  /// Bytes of what the tile holds: the same for equal tiles, whatever room they have left.
+  [[nodiscard]] std::size_t bytes() const noexcept { return sizeof *this + hits_.size() * sizeof(Hits); }
   friend bool operator==(const OccupancyTile&, const OccupancyTile&) = default;
+
+private:
+  struct Hits {
+    std::uint8_t count = 0;
+    std::uint16_t mean_x = 0, mean_y = 0;
+    friend bool operator==(const Hits&, const Hits&) = default;
+  };
+
+  [[nodiscard]] static std::uint32_t bit(std::size_t place) noexcept {
+    return std::uint32_t{1} << (place % tile_side);
+  }
+  /// The cell of the lowest bit.
+  [[nodiscard]] static std::size_t first_of(std::size_t row, std::uint32_t bits) noexcept {
+    return row * tile_side + static_cast<std::size_t>(std::countr_zero(bits));
+  }
+  /// Where a cell that was hit has its hits: how many cells before it have some.
+  [[nodiscard]] std::size_t rank(std::size_t place) const noexcept {
+    return before_row_[place / tile_side] + ones_in(ever_hit_[place / tile_side] & (bit(place) - 1));
+  }
+  /// std::popcount is a call where the target has no instruction for it.
+  [[nodiscard]] static std::size_t ones_in(std::uint32_t n) noexcept {
+    n -= n >> 1U & 0x55555555U;
+    n = (n & 0x33333333U) + (n >> 2U & 0x33333333U);
+    return ((n + (n >> 4U)) & 0x0f0f0f0fU) * 0x01010101U >> 24U;
+  }
+  Hits& added(std::size_t place) {
+    const auto at = hits_.insert(hits_.begin() + static_cast<std::ptrdiff_t>(rank(place)), Hits{});
+    ever_hit_[place / tile_side] |= bit(place);
+    for (std::size_t row = place / tile_side + 1; row < tile_side; ++row) ++before_row_[row];
+    return *at;
+  }
+  /// Halves the counts of those of eight cells that have a bit and can count no further.
+  void halve(std::size_t first, std::uint32_t passed) noexcept {
+    for (std::size_t place = first; passed != 0; ++place, passed >>= 1U) {
+      if ((passed & 1U) == 0 || visits_[place] != 255) continue;
+      visits_[place] = 128;
+      if ((ever_hit_[place / tile_side] & bit(place)) == 0) continue;
+      Hits& hits = hits_[rank(place)];
+      hits.count = static_cast<std::uint8_t>((hits.count + 1) / 2);
+    }
+  }
+
+  [[nodiscard]] static std::uint64_t load_eight(const std::uint8_t* from) noexcept {
+    std::uint64_t eight = 0;
+    std::memcpy(&eight, from, sizeof eight);
+    return eight;
+  }
+  /// A byte 1 for each of eight bits, the lowest first in memory.
+  [[nodiscard]] static std::uint64_t spread(std::uint32_t bits) noexcept {
+    constexpr std::uint64_t own =
+        std::endian::native == std::endian::little ? 0x8040201008040201U : 0x0102040810204080U;
+    constexpr std::uint64_t each = 0x0101010101010101U;
+    return ((bits * each & own) + 0x7f * each) >> 7U & each;
+  }
+  /// Whether any byte of those that have a 1 is 255.
+  [[nodiscard]] static bool any_full(std::uint64_t bytes, std::uint64_t ones) noexcept {
+    const std::uint64_t left = ~(bytes & (255 * ones));  // 0 where it is
+    return ((left - 0x0101010101010101U) & ~left & 0x8080808080808080U) != 0;
+  }
+
+  std::array<std::uint8_t, tile_cells> visits_{};
+  ObstacleBits ever_hit_{};
+  std::array<std::uint16_t, tile_side> before_row_{};  // hits_ of the rows above
+  std::vector<Hits> hits_;
 };
 template <>
 struct TileOf<OccupancyCell> {
@@ -91,7 +205,7 @@ public:
     Field::expect_radius(field_radius_);
   }
 
-  /// The grid again whose cells() these are, every one marked, with the same options: from a file.
+  /// The grid again whose cells() these are, with the same options: from a file.
   OccupancyGrid(const OccupancyOptions& options, SharedTiles<OccupancyCell> cells) : OccupancyGrid(options) {
     cells_ = std::move(cells);
     cells_.for_each_tile([&](TileAddress, const auto&) { empty_ = false; });
@@ -114,17 +228,16 @@ public:
     for (const Point& end : ends) marks.ray(end);
     for (const Point& end : ends) marks.hit(end);
     marks.expect_room(cells_);
-    marks.for_each_tile([&](TileAddress tile, const auto& visit_cells) {
-      auto& out = cells_.writable_tile(tile);
-      visit_cells([&](std::size_t place, bool stopped) {
-        count(out[place], stopped);
-        if (out[place].hits > 0) out.mark(place);
-      });
-    });
     auto write = cells_.writer();
+    marks.for_each_tile([&](TileAddress address, const ObstacleBits& passed, const ObstacleBits& stopped) {
+      OccupancyTile& tile = write.tile(address);
+      for (std::size_t row = 0; row < tile_side; ++row)
+        if (passed[row] != 0) tile.count(row, passed[row], stopped[row]);
+    });
     for (std::size_t i = 0, next = 0; i < ends.size(); i = next) {
       const Point mean = mean_of_run(ends, i, next);
-      move_mean(write(mean.cell), mean);
+      write.tile(tile_of(mean.cell))
+          .move_mean(place_in_tile(mean.cell), mean.column - mean.cell.column, mean.row - mean.cell.row);
     }
     empty_ = false;
   }
@@ -171,6 +284,13 @@ private:
     }
 
     void ray(const Point& end) {
+      Tile* const tiles = tiles_.data();  // not looked up again after every word that is written
+      const TileAddress low = first_;
+      const std::int32_t columns = columns_;
+      const auto tile = [&](CellAddress cell) -> Tile& {
+        const TileAddress at = tile_of(cell);
+        return tiles[static_cast<std::size_t>((at.row - low.row) * columns + (at.column - low.column))];
+      };
       if (std::abs(end.column - start_.column) >= std::abs(end.row - start_.row))
         walk_rows(start_.column, start_.row, end.column, end.row,
                   [&](std::int32_t row, std::int32_t first, std::int32_t last) {
@@ -196,8 +316,7 @@ private:
       cells.expect_room(first_, {first_.column + columns_ - 1, first_.row + rows_ - 1});
     }
 
-    /// visit(tile, cells) with cells(f) calling f(place in the tile, whether stopped), for every tile with a
-    /// mark.
+    /// visit(tile, passed, stopped) for every tile with a mark.
     template <class Visit>
     void for_each_tile(const Visit& visit) {
       for (std::int32_t t = 0; t < columns_ * rows_; ++t) {
@@ -210,22 +329,15 @@ private:
         }
         for (const std::uint32_t row : marks.passed) any |= row;
         if (any == 0) continue;
-        visit(TileAddress{first_.column + t % columns_, first_.row + t / columns_}, [&](const auto& f) {
-          for (std::size_t row = 0; row < tile_side; ++row) {
-            const std::uint32_t stopped = marks.stopped[row];
-            for (std::uint32_t left = marks.passed[row]; left != 0; left &= left - 1) {
-              const auto column = static_cast<std::uint32_t>(std::countr_zero(left));
-              f(row * tile_side + column, (stopped >> column & 1U) != 0);
-            }
-          }
-        });
+        visit(TileAddress{first_.column + t % columns_, first_.row + t / columns_}, marks.passed,
+              marks.stopped);
       }
     }
 
   private:
     struct Tile {
-      std::array<std::uint32_t, tile_side> passed{}, stopped{};  // a bit a column
-      std::array<std::uint32_t, tile_side> upright{};            // passed, a word a column and a bit a row
+      ObstacleBits passed{}, stopped{};
+      ObstacleBits upright{};  // passed, a word a column and a bit a row
     };
     /// Calls visit(cell, bits) for the words of 32 cells that hold a run.
     template <class Visit>
@@ -260,25 +372,6 @@ private:
     std::int32_t columns_ = 0, rows_ = 0;
     std::vector<Tile> tiles_;
   };
-
-  static void count(OccupancyCell& cell, bool stopped) noexcept {
-    if (cell.visits == 255) {
-      cell.visits = 128;
-      cell.hits = static_cast<std::uint8_t>((cell.hits + 1) / 2);
-    }
-    ++cell.visits;
-    if (stopped) ++cell.hits;
-  }
-
-  /// Moves the mean hit point of the end's cell towards it.
-  static void move_mean(OccupancyCell& cell, const Point& end) noexcept {
-    const auto moved = [&](std::uint16_t& mean, double fraction) {
-      const double before = mean, target = 65535.0 * fraction;
-      mean = static_cast<std::uint16_t>(std::lrint(before + (target - before) / std::max<int>(1, cell.hits)));
-    };
-    moved(cell.mean_x, end.column - end.cell.column);
-    moved(cell.mean_y, end.row - end.cell.row);
-  }
 
   /// The mean of the points from `first` on that lie in the same cell; `next` is the first beyond.
   [[nodiscard]] static Point mean_of_run(const std::vector<Point>& points, std::size_t first,
