@@ -36,7 +36,7 @@ public:
 
   const cairn::Features& operator()(cairn::ImageView image) {
     std::vector<cairn::Keypoint> kept = surf_.detect(image);
-    const auto end = std::ranges::stable_partition(
+    const auto end = std::ranges::partition(
         kept, [&](const cairn::Keypoint& point) { return !hidden_.hides(point.x, point.y); });
     std::vector<cairn::Keypoint> within(end.begin(), end.end());
     kept.erase(end.begin(), end.end());

@@ -516,7 +516,8 @@ std::vector<std::size_t> Pipeline::still_against(const cairn::SE3& T_world_camer
 
 /// The other of two motions that matches agree on, where it reaches farther over the image
 /// (riding_along.hpp): that of those that moved, where most that agree on `pose`, or all that could, stand
-/// still; otherwise that of those that stand still.
+/// still; otherwise that of those that stand still, where it reaches twice as far and nothing is known to
+/// ride along.
 std::optional<cairn::StereoPose> Pipeline::farther_reaching(const cairn::StereoPose& pose,
                                                             const std::vector<Match>& matches) {
   std::vector<std::size_t> still, moved;
@@ -558,8 +559,9 @@ std::optional<cairn::StereoPose> Pipeline::farther_reaching(const cairn::StereoP
     return other;
   }
   const std::vector<std::size_t> against = still_against(pose.T_world_camera, matches);
-  if (against.size() < options_.relocating_inliers ||
-      reaches(against, unsuspected) <= reaches(moved, [&](std::size_t i) { return pose.inliers[i] != 0; }))
+  const double moved_reach = reaches(moved, [&](std::size_t i) { return pose.inliers[i] != 0; });
+  if (against.size() < options_.relocating_inliers || riding_along_[0].hidden().count() > 0 ||
+      reaches(against, unsuspected) < 2 * moved_reach)
     return std::nullopt;
   return agreed_by(against);
 }
