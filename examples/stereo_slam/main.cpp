@@ -75,9 +75,10 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
       ->type_name("KIND [DIR]")
       ->default_str("arena");
   CLI::Option* const camera =
-      app.add_option("--camera", arguments.camera,
-                     "the stereo rig (rig.yaml, of cairn or of OpenCV): of --left and --right, or instead of "
-                     "the recording's own")
+      app.add_option(
+             "--camera", arguments.camera,
+             "the stereo rig (rig.yaml, of cairn, OpenCV or Kalibr): of --left and --right, or instead of "
+             "the recording's own")
           ->type_name("FILE");
   CLI::Option* const left =
       app.add_option("--left", arguments.dataset.left,

@@ -168,6 +168,29 @@ void take_matrix(const Fields& fields, const std::string& key, cairn::PinholePar
   p.cy = k[5];
 }
 
+void take_intrinsics(const Fields& fields, cairn::PinholeParameters& p) {
+  const auto k = fields.numbers_of<4>("intrinsics", "fx, fy, cx, cy");
+  p.fx = k[0];
+  p.fy = k[1];
+  p.cx = k[2];
+  p.cy = k[3];
+}
+
+void take_size(const Fields& fields, const std::string& key, cairn::PinholeParameters& p) {
+  const auto size = fields.numbers_of<2>(key, "width, height");
+  p.width = fields.side(size[0], key);
+  p.height = fields.side(size[1], key);
+}
+
+/// One of those that the library has.
+std::string lens_model(const Fields& fields) {
+  const std::string model = fields.word("distortion_model", "plumb_bob");
+  if (model != "plumb_bob" && model != "radtan" && model != "radial-tangential" && model != "none")
+    fields.refuse("the lens model '" + model.substr(0, 40) +
+                  "' is not supported; expected plumb_bob (also called radtan, radial-tangential) or none");
+  return model;
+}
+
 /// OpenCV's order; more than five numbers are of models that the library does not have.
 void take_distortion(const Fields& fields, const std::string& key, cairn::PinholeParameters& p) {
   const std::string expected = "4 or 5 finite numbers [k1, k2, p1, p2, k3]";
@@ -196,25 +219,15 @@ Camera camera_of(const Fields& fields) {
   fields.expect_only({"image_size", "intrinsics", "camera_matrix", "distortion_model", "distortion",
                       "intrinsics_sigma", "distortion_sigma"});
   cairn::PinholeParameters p;
-  const auto size = fields.numbers_of<2>("image_size", "width, height");
-  p.width = fields.side(size[0], "image_size");
-  p.height = fields.side(size[1], "image_size");
+  take_size(fields, "image_size", p);
   if (fields.has("camera_matrix") && fields.has("intrinsics"))
     fields.refuse("has both intrinsics and camera_matrix; expected one of them");
-  if (fields.has("camera_matrix")) {
+  if (fields.has("camera_matrix"))
     take_matrix(fields, "camera_matrix", p);
-  } else {
-    const auto k = fields.numbers_of<4>("intrinsics", "fx, fy, cx, cy");
-    p.fx = k[0];
-    p.fy = k[1];
-    p.cx = k[2];
-    p.cy = k[3];
-  }
+  else
+    take_intrinsics(fields, p);
   if (fields.has("distortion_model")) {
-    const std::string model = fields.word("distortion_model", "plumb_bob");
-    if (model != "plumb_bob" && model != "radtan" && model != "radial-tangential" && model != "none")
-      fields.refuse("the lens model '" + model.substr(0, 40) +
-                    "' is not supported; expected plumb_bob (also called radtan, radial-tangential) or none");
+    const std::string model = lens_model(fields);
     if (model == "none" && fields.has("distortion"))
       fields.refuse("says that there is no distortion, and has one");
   }
@@ -275,11 +288,40 @@ cairn::PinholeCamera opencv_camera(const Fields& fields, const std::string& side
   return fields.made([&] { return cairn::PinholeCamera(p); });
 }
 
+cairn::PinholeCamera kalibr_camera(const Fields& fields) {
+  cairn::PinholeParameters p;
+  const std::string projection = fields.word("camera_model", "pinhole");
+  if (projection != "pinhole")
+    fields.refuse("the camera model '" + projection.substr(0, 40) + "' is not supported; expected pinhole");
+  take_size(fields, "resolution", p);
+  take_intrinsics(fields, p);
+  if (lens_model(fields) != "none") take_distortion(fields, "distortion_coeffs", p);
+  return fields.made([&] { return cairn::PinholeCamera(p); });
+}
+
+/// A camera chain of Kalibr's (its wiki, "Yaml formats"): T_cn_cnm1 of a camera carries coordinates of the
+/// one before to its own. Its other keys are passed over.
+CalibratedRig kalibr_format(const Fields& fields) {
+  if (fields.has("cam2"))
+    fields.refuse("is a chain of more than two cameras; expected cam0 (left) and cam1 (right) alone");
+  const Fields left = fields.part("cam0"), right = fields.part("cam1");
+  const auto t = right.numbers_of<16>("T_cn_cnm1", "a motion's 4 x 4 matrix, row by row");
+  if (t[12] != 0 || t[13] != 0 || t[14] != 0 || t[15] != 1)
+    right.refuse("the field T_cn_cnm1 does not end with 0, 0, 0, 1; expected a motion's 4 x 4 matrix");
+  cairn::Matrix<3> R;
+  R << t[0], t[1], t[2], t[4], t[5], t[6], t[8], t[9], t[10];
+  const cairn::SO3 rotation = right.made([&] { return cairn::SO3::from_matrix(R); });
+  CalibratedRig result;
+  result.rig = {kalibr_camera(left), kalibr_camera(right),
+                cairn::SE3(rotation, cairn::Vector<3>(t[3], t[7], t[11])).inverse()};
+  return result;
+}
+
 CalibratedRig opencv_format(const Fields& fields) {
   if (!fields.has("M1") && !fields.has("R"))
     fields.refuse(
         "is no rig; expected the field cairn_rig (see examples/support/rig_file.hpp), or M1, D1, M2, D2, "
-        "R and T of OpenCV's stereo calibration");
+        "R and T of OpenCV's stereo calibration, or cam0 and cam1 of Kalibr's");
   CalibratedRig result;
   const cairn::SE3 T_right_left(rotation_of(fields, "R"), vector_of(fields.numbers_of<3>("T", "x, y, z")));
   result.rig = {opencv_camera(fields, "1"), opencv_camera(fields, "2"), T_right_left.inverse()};
@@ -346,7 +388,9 @@ CalibratedRig parse_rig([[maybe_unused]] std::string_view text, const std::strin
     cairn::raise(name + ":" + std::to_string(error.mark.line + 1) + ": is no YAML (" + error.msg + ")");
   }
   const Fields fields(root, name, "");
-  CalibratedRig result = fields.has("cairn_rig") ? own_format(fields) : opencv_format(fields);
+  CalibratedRig result = fields.has("cairn_rig") ? own_format(fields)
+                         : fields.has("cam0")    ? kalibr_format(fields)
+                                                 : opencv_format(fields);
   const double baseline = result.rig.baseline();
   if (!(baseline > 0) || !std::isfinite(baseline))
     cairn::raise(name + ": the cameras stand at one place; expected a baseline");

@@ -24,7 +24,8 @@
 /// Instead of `intrinsics` a camera may have OpenCV's `camera_matrix`, and any list may be one of OpenCV's
 /// matrices (`rows`, `cols`, `dt`, `data`). A file without `cairn_rig` is read as what OpenCV's stereo
 /// calibration leaves: M1, D1, M2, D2, R, T with x_right = R x_left + T, and image_width, image_height where
-/// they are there; its other keys are passed over. T is then taken to be in metres.
+/// they are there; its other keys are passed over. T is then taken to be in metres. One with `cam0` is a
+/// camera chain of Kalibr's, of two pinhole cameras, the left one first.
 #pragma once
 
 #include <array>

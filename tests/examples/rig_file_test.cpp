@@ -97,6 +97,27 @@ T: !!opencv-matrix
    data: [ -0.1, 0.02, 0. ]
 )";
 
+const std::string kalibr = R"(cam0:
+  cam_overlaps: [1]
+  camera_model: pinhole
+  distortion_coeffs: [-0.28, 0.07, 0.0002, 0.00002]
+  distortion_model: radtan
+  intrinsics: [458.6, 457.3, 367.2, 248.4]
+  resolution: [752, 480]
+  rostopic: /cam0/image_raw
+cam1:
+  T_cn_cnm1:
+  - [0.0, 1.0, 0.0, -0.11]
+  - [-1.0, 0.0, 0.0, 0.02]
+  - [0.0, 0.0, 1.0, 0.03]
+  - [0.0, 0.0, 0.0, 1.0]
+  camera_model: pinhole
+  distortion_model: none
+  distortion_coeffs: []
+  intrinsics: [457.5, 456.1, 379.9, 255.2]
+  resolution: [752, 480]
+)";
+
 /// `text` with its first `from` replaced.
 std::string with(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
@@ -168,6 +189,21 @@ TEST_SUITE("rig_file") {
     CHECK((seen - cairn::Vector<3>(-2 - 0.1, 1 + 0.02, 3)).norm() < 1e-12);
   }
 
+  TEST_CASE("rig_file: a camera chain of Kalibr's, whose motion is the other way round as well") {
+    const example::CalibratedRig rig = example::parse_rig(kalibr, "camchain.yaml");
+    const cairn::PinholeParameters &left = rig.rig.left.parameters(), &right = rig.rig.right.parameters();
+    CHECK(std::vector{left.fx, left.fy, left.cx, left.cy} == std::vector{458.6, 457.3, 367.2, 248.4});
+    CHECK(std::vector{left.k1, left.k2, left.p1, left.p2, left.k3} ==
+          std::vector{-0.28, 0.07, 0.0002, 0.00002, 0.0});
+    CHECK(right.cy == 255.2);
+    CHECK(right.k1 == 0);
+    CHECK(right.width == 752);
+    CHECK(right.height == 480);
+    // x_cam1 = T_cn_cnm1 x_cam0
+    const cairn::Vector<3> x(1, 2, 3), seen = rig.rig.T_left_right.inverse() * x;
+    CHECK((seen - cairn::Vector<3>(2 - 0.11, -1 + 0.02, 3 + 0.03)).norm() < 1e-12);
+  }
+
   TEST_CASE("rig_file: every field that is missing or wrong is named") {
     const std::vector<std::pair<std::string, std::string>> broken{
         {"", "expected fields"},
@@ -215,6 +251,15 @@ TEST_SUITE("rig_file") {
         {with(opencv, "D2: !!opencv-matrix", "D3: !!opencv-matrix"), "lacks the field D2;"},
         {with(opencv, "data: [ -0.28", "date: [ -0.28"), "the field D2 has no list 'data'"},
         {with(opencv, "image_height: 480", "image_height: high"), "the field image_height has 0"},
+        {with(kalibr, "cam1:", "cam3:"), "lacks the field cam1"},
+        {with(kalibr, "  T_cn_cnm1", "  T_cam_imu"), "lacks the field cam1.T_cn_cnm1"},
+        {with(kalibr, "- [0.0, 0.0, 0.0, 1.0]", "- [0.0, 0.0, 0.0, 2.0]"),
+         "T_cn_cnm1 does not end with 0, 0, 0, 1"},
+        {with(kalibr, "[0.0, 1.0, 0.0, -0.11]", "[0.0, 1.1, 0.0, -0.11]"), "cam1: SO3::from_matrix"},
+        {with(kalibr, "radtan", "equidistant"), "cam0: the lens model 'equidistant' is not supported"},
+        {with(kalibr, "camera_model: pinhole", "camera_model: omni"),
+         "the camera model 'omni' is not supported"},
+        {kalibr + "cam2: {}\n", "more than two cameras"},
         {std::string(2 << 20, '\n'), "larger than a rig can be"},
     };
     for (const auto& [text, words] : broken) {
