@@ -56,6 +56,24 @@ double stillness(double sigma) {
   return 1 + 3 * sigma;
 }
 
+/// What may be why a frame shows next to nothing, in brackets; empty where nothing strikes.
+std::string oddity_of(const cairn::StereoRig& rig, const StereoFrame& frame) {
+  const cairn::PinholeParameters& camera = rig.left.parameters();
+  if (!rig.left.contains(cairn::Vector<2>(camera.cx, camera.cy)))
+    return " (the rig has the principal point of the left camera at " + cairn::shortest(camera.cx) + ", " +
+           cairn::shortest(camera.cy) + ", outside of its image)";
+  int darkest = 255, brightest = 0;
+  for (int y = 0; y < frame.left.height(); ++y)
+    for (int x = 0; x < frame.left.width(); ++x) {
+      darkest = std::min<int>(darkest, frame.left(x, y));
+      brightest = std::max<int>(brightest, frame.left(x, y));
+    }
+  constexpr int hardly_any = 32;
+  if (brightest - darkest >= hardly_any) return {};
+  return " (the left image's grey levels are " + std::to_string(darkest) + " to " +
+         std::to_string(brightest) + " of 255: 10 or 12 bits in files of 16 have to be scaled to fill them)";
+}
+
 std::string as_asked(const PipelineOptions& options) {
   return std::string("asked for: ") + calibration_names[static_cast<std::size_t>(options.calibrate)];
 }
@@ -282,7 +300,8 @@ std::optional<std::string> Pipeline::of_two_moments(const StereoFrame& frame) {
 /// The first frame that shows enough is where the world begins.
 void Pipeline::begin(const StereoFrame& frame, FrameRecord& result) {
   result.tracked = locals_.size() >= options_.min_inliers;
-  if (!result.tracked) return lose(frame, "too few points with a place make no beginning", result);
+  if (!result.tracked)
+    return lose(frame, "too few points with a place make no beginning" + oddity_of(rig_, frame), result);
   timed(result, Stage::store, [&] {
     choose_calibration();
     map_.begin(T_world_camera_);

@@ -394,6 +394,24 @@ TEST_SUITE("pipeline") {
     CHECK(record.frames.back().tracked);
   }
 
+  TEST_CASE("pipeline: what strikes in images or rig is said where a frame makes no beginning") {
+    std::vector<StereoFrame> faint{drive()[0]};
+    for (cairn::Image* image : {&faint[0].left, &faint[0].right})
+      for (int y = 0; y < image->height(); ++y)
+        for (int x = 0; x < image->width(); ++x)
+          (*image)(x, y) = static_cast<std::uint8_t>((*image)(x, y) / 16);
+    const auto notes = run(faint, options()).notes;
+    REQUIRE(notes.size() == 1);
+    CHECK(notes[0].find("of 255: 10 or 12 bits in files of 16") != std::string::npos);
+
+    cairn::PinholeParameters swapped = rig().left.parameters();
+    swapped.cx = swapped.width + 100;
+    const cairn::StereoRig odd{cairn::PinholeCamera(swapped), rig().right, rig().T_left_right};
+    const auto said = run({black(drive()[0])}, options(), odd).notes;
+    REQUIRE(said.size() == 1);
+    CHECK(said[0].find("principal point of the left camera at 484") != std::string::npos);
+  }
+
   TEST_CASE("pipeline: nothing but black frames leaves an empty map and no NaN") {
     std::vector<StereoFrame> frames{black(drive()[0]), black(drive()[1])};
     const RunRecord record = run(frames, options());
