@@ -239,7 +239,10 @@ BoardCalibration calibrate(std::span<const cairn::Vector<3>> board, std::span<co
     cairn::raise("fewer points than numbers to estimate; expected more views or a larger board");
   State state{start, {T_left_board.begin(), T_left_board.end()}};
   double cost = cost_of(board, views, state);
-  if (!std::isfinite(cost)) cairn::raise("calibration: the start puts a board where no camera sees it");
+  if (!std::isfinite(cost))
+    cairn::raise(
+        "calibration: the start puts a board where no camera sees it; expected pairs "
+        "taken at one moment, the left image of each with its own right one");
   BoardCalibration result;
   Dense A;
   Column b;

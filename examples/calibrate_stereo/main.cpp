@@ -110,6 +110,11 @@ Results run(const Arguments& arguments) {
     if (round == 0) leave_out_mistaken(results.calibration, results);
     if (results.views.size() == before) break;
   }
+  const cairn::Vector<3> to_right = results.calibration.rig.rig.T_left_right.translation();
+  if (!(to_right(0) > 0.5 * to_right.norm()))
+    results.notes.push_back(
+        "the camera of --right does not stand to the right of the other: expected the images exchanged, "
+        "where this is a rig that looks ahead with its cameras side by side");
   results.held_out = leave_one_out(results.board, results.columns, results.views, results.calibration,
                                    arguments.calibration);
   results.calibration.rig.note = "calibrated from " + std::to_string(results.views.size()) + " pairs, RMS " +

@@ -84,6 +84,31 @@ TEST_SUITE("calibrate_stereo/program") {
     REQUIRE(rig.angle_sigma());
     CHECK(*rig.angle_sigma() > 1e-5);
     CHECK(*rig.angle_sigma() < 5e-3);
+    CHECK_FALSE(outcome.says("images exchanged"));
+  }
+
+  TEST_CASE("calibrate_stereo: sides that are exchanged, and images that are no pairs, are said") {
+    const auto data = cairn_test::real_data("stereo_pairs");
+    if (!data) return;
+    const fs::path boards = *data / "opencv-chessboard-stereo";
+    const cairn_test::Folder folder;
+    const std::string out = " --out \"" + (folder / "out").string() + "\"";
+    const Outcome exchanged = run("--left \"" + (boards / "right0[1-5].jpg").string() + "\" --right \"" +
+                                  (boards / "left0[1-5].jpg").string() + "\"" + out);
+    CAPTURE(exchanged.words);
+    CHECK(exchanged.code == 0);
+    CHECK(exchanged.says("expected the images exchanged"));
+
+    for (int i = 1; i <= 5; ++i) {
+      const std::string number = std::to_string(i), other = std::to_string(6 - i);
+      fs::copy_file(boards / ("left0" + number + ".jpg"), folder / ("l" + number + ".jpg"));
+      fs::copy_file(boards / ("right0" + other + ".jpg"), folder / ("r" + number + ".jpg"));
+    }
+    const Outcome mixed =
+        run("--left \"" + (folder / "l*").string() + "\" --right \"" + (folder / "r*").string() + "\"" + out);
+    CAPTURE(mixed.words);
+    CHECK(mixed.code == 2);
+    CHECK(mixed.says("taken at one moment"));
   }
 #endif
 }
