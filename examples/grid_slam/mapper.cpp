@@ -235,8 +235,9 @@ Matrix<3> Mapper::motion_noise() const {
   const double along = n.offset + n.per_metre * d + n.per_radian * a;
   // A way without scans (a hole in the log) is as many turns as it would have been steps, each with an error
   // of its own; were it one error that grows with the way, 12 m would leave the heading open by 35 degrees.
-  const double steps = std::max({1.0, d / (2 * options_.step_distance), a / (2 * options_.step_angle)});
-  const double turn = n.angle_offset + (n.angle_per_metre * d + n.angle_per_radian * a) / steps;
+  // (A quick turn between two scans is one turn: counted as several it cost ACES a relation of 1 m.)
+  const double steps = std::max(1.0, d / (2 * options_.step_distance));
+  const double turn = n.angle_offset + n.angle_per_metre * d / steps + n.angle_per_radian * a / steps;
   return Vector<3>(along * along, along * along, steps * turn * turn).asDiagonal();
 }
 

@@ -67,12 +67,9 @@ public:
 
   /// A field that looks `radius` cells far, above 0 and at most 16. Throws Error.
   DistanceField(const SharedTiles<Cell>& cells, double radius)
-      : cells_(&cells),
-        radius_(static_cast<float>(radius)),
-        reach_(static_cast<int>(std::ceil(std::clamp(radius, double{normal_reach}, largest_radius)))),
-        nearest_(slots),
-        normals_(slots / 4) {
+      : cells_(&cells), radius_(static_cast<float>(radius)), nearest_(slots), normals_(slots / 4) {
     expect_radius(radius);
+    reach_ = static_cast<int>(std::ceil(std::clamp(radius, double{normal_reach}, largest_radius)));
   }
 
   [[nodiscard]] double radius() const noexcept { return static_cast<double>(radius_); }
@@ -256,7 +253,7 @@ private:
   static inline const Cell blank{};
   const SharedTiles<Cell>* cells_;
   float radius_;
-  int reach_;  // cells beyond a tile that are looked at
+  int reach_ = 0;  // cells beyond a tile that are looked at
   std::vector<Slot<NearestObstacle>> nearest_;
   std::vector<Slot<Normal>> normals_;
   std::vector<Around> around_;
