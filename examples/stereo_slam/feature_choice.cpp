@@ -69,10 +69,6 @@ bool built_with_opencv() noexcept {
 #endif
 }
 
-Extractor make_extractor(const FeatureOptions& options) {
-  return make_extractor(options, {});
-}
-
 Extractor make_extractor(const FeatureOptions& options, HiddenCells hidden) {
   if (options.kind == FeatureKind::surf) {
     cairn::SurfOptions surf;

@@ -38,9 +38,8 @@ struct FeatureOptions {
 using Extractor = std::function<const cairn::Features&(cairn::ImageView)>;
 static_assert(cairn::FeatureExtractor<Extractor>);
 
-/// Throws cairn::Error where the kind needs OpenCV and there is none.
-[[nodiscard]] Extractor make_extractor(const FeatureOptions& options);
-/// SURF keeps as many points as without outside of what is hidden, and a tenth as many within.
-[[nodiscard]] Extractor make_extractor(const FeatureOptions& options, HiddenCells hidden);
+/// Throws cairn::Error where the kind needs OpenCV and there is none. SURF keeps as many points outside of
+/// what is hidden as it would of the whole image, and a tenth as many within.
+[[nodiscard]] Extractor make_extractor(const FeatureOptions& options, HiddenCells hidden = {});
 
 }  // namespace stereo_slam

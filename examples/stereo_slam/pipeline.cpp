@@ -152,20 +152,21 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options, 
 }
 
 const FrameRecord& Pipeline::step(const StereoFrame& frame, double load_milliseconds) {
+  return step_by_own_points(frame, budget_.points(), load_milliseconds);
+}
+
+const FrameRecord& Pipeline::step_by_own_points(const StereoFrame& frame, int wanted,
+                                                double load_milliseconds) {
   if (!front_end_) front_end_.emplace(feature_options(options_), options_.threads);
-  front_end_->keep(budget_.points());
+  front_end_->keep(wanted);
   front_end_->leave_alone(left_alone_);
   return step(frame, (*front_end_)(frame, match_stereo_), load_milliseconds);
 }
 
 const FrameRecord& Pipeline::step(const StereoFrame& frame, const FramePoints& points,
                                   double load_milliseconds) {
-  if (points.left_alone != left_alone_) {  // they were found before this was known
-    if (!front_end_) front_end_.emplace(feature_options(options_), options_.threads);
-    front_end_->keep(points.wanted > 0 ? points.wanted : budget_.points());
-    front_end_->leave_alone(left_alone_);
-    return step(frame, (*front_end_)(frame, match_stereo_), load_milliseconds);
-  }
+  if (points.left_alone != left_alone_)  // they were found before this was known
+    return step_by_own_points(frame, points.wanted > 0 ? points.wanted : budget_.points(), load_milliseconds);
   FrameRecord& result = record_.frames.emplace_back();
   const auto of = [&](Stage stage) -> double& {
     return result.milliseconds[static_cast<std::size_t>(stage)];
@@ -612,10 +613,10 @@ void Pipeline::leave_out_what_rides_along(cairn::StereoPose& pose, std::vector<M
 /// For the record, and for those who look for the points of the next frames. These are not bothered with
 /// every cell: frames that are under way are looked at once more then.
 void Pipeline::note_what_rides_along() {
-  const HiddenParts now{riding_along_[0].hidden(), riding_along_[1].hidden()};
-  const std::size_t count = now[0].count() + now[1].count();
+  const std::size_t count = riding_along_[0].hidden().count() + riding_along_[1].hidden().count();
   const std::size_t before = left_alone_ ? (*left_alone_)[0].count() + (*left_alone_)[1].count() : 0;
   if (count == 0 && before == 0) return;
+  const HiddenParts now{riding_along_[0].hidden(), riding_along_[1].hidden()};
   const std::size_t unlike =
       left_alone_ ? now[0].unlike((*left_alone_)[0]) + now[1].unlike((*left_alone_)[1]) : count;
   if (count == 0)

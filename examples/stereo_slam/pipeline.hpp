@@ -210,6 +210,7 @@ private:
 
   [[nodiscard]] Places settle(const cairn::SE3& T_world_camera, std::span<const Match> matches,
                               std::span<cairn::StereoSighting> sightings);
+  const FrameRecord& step_by_own_points(const StereoFrame& frame, int wanted, double load_milliseconds);
   [[nodiscard]] bool stands_still(const Match& match) const;
   [[nodiscard]] std::vector<std::size_t> still_against(const cairn::SE3& T_world_camera,
                                                        std::span<const Match> matches);
