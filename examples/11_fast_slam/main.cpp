@@ -140,7 +140,7 @@ int main(int argc, char** argv) {
   lesson.csv("fast_slam", {"step", "nees", "effective_particles"}, rows);
   example::LinePlot plot{"Depletion", "", {"step"}, {"number"}, steps};
   plot.caption = "NEES, mean of 6 runs: 3 is right. Effective number of particles, first run.";
-  plot.curves = {{"NEES", Ink::wrong, nees}, {"effective particles", Ink::belief, effective}};
+  plot.curves = {{"NEES", Ink::violet, nees}, {"effective particles", Ink::belief, effective}};
   plot.logarithmic = true;
   lesson.add(plot);
   return lesson.finish();

@@ -91,16 +91,32 @@ void check(const Options& o) {
     cairn::raise("--delta: expected at least one frame");
 }
 
+/// What estimates are called: their files, or where two are called the same, the folders that hold them, or
+/// where that does not tell them apart either, all of the path.
+std::vector<std::string> names_of(const std::vector<std::string>& estimates) {
+  std::vector<std::string> names;
+  const auto differ = [&](const auto& name_of) {
+    names.clear();
+    for (const std::filesystem::path path : estimates) names.push_back(name_of(path));
+    return std::set<std::string>(names.begin(), names.end()).size() == names.size();
+  };
+  if (!differ([](const auto& path) { return path.stem().string(); }) &&
+      !differ([](const auto& path) { return path.parent_path().filename().string(); }))
+    differ([](const auto& path) { return path.string(); });
+  return names;
+}
+
 std::vector<NamedEvaluation> evaluate_all(const Options& o) {
   const TrajectoryFile truth = read_trajectory(o.truth, formats.at(o.truth_format), o.times);
   std::vector<NamedEvaluation> all;
+  const std::vector<std::string> names = o.names.empty() ? names_of(o.estimates) : o.names;
   bool takes_times = truth.format == Format::kitti;
   for (std::size_t i = 0; i < o.estimates.size(); ++i) {
     const TrajectoryFile estimate = read_trajectory(o.estimates[i], formats.at(o.format), o.times);
     takes_times = takes_times || estimate.format == Format::kitti;
     const bool covers = !o.covariances.empty() && o.covariances[i] != "-";
     all.push_back(
-        {o.names.empty() ? estimate.path.stem().string() : o.names[i],
+        {names[i],
          evaluate(truth, estimate, covers ? std::optional(read_covariances(o.covariances[i])) : std::nullopt,
                   o.evaluation)});
   }

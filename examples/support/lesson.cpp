@@ -129,7 +129,8 @@ void Lesson::verdict(const std::string& name, double value, double low, double h
   const bool right = value >= low && value <= high;
   const std::string band = readable(low, 4) + " to " + readable(high, 4);
   std::string more = hint.empty() ? "" : ". " + hint;
-  if (!hint.empty() && hint[0] >= 'a' && hint[0] <= 'z') more[2] = static_cast<char>(hint[0] - 'a' + 'A');
+  const bool is_word = hint.size() > 1 && hint[1] >= 'a' && hint[1] <= 'z';  // no symbol, s^2
+  if (is_word && hint[0] >= 'a' && hint[0] <= 'z') more[2] = static_cast<char>(hint[0] - 'a' + 'A');
   say((right ? "ok     " : "WRONG  ") + name + ": " + readable(value, 4) + ", expected " + band);
   figure({.label = name,
           .value = readable(value, 4),

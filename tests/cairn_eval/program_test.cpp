@@ -325,6 +325,28 @@ TEST_CASE("cairn_eval: the same files give the same bytes, and the page where th
         std::string::npos);
 }
 
+TEST_CASE("cairn_eval: estimates of one file name are told apart by their folders, else by their paths") {
+  const cairn_test::Folder folder;
+  const cairn::Trajectory trajectory = walk();
+  cairn::write_tum(folder / "truth.tum", trajectory);
+  const auto names = [&](const std::vector<std::string>& estimates) {
+    std::string arguments = quoted(folder / "truth.tum");
+    for (const std::string& each : estimates) {
+      fs::create_directories((folder / each).parent_path());
+      cairn::write_tum(folder / each, trajectory);
+      arguments += quoted(folder / each);
+    }
+    const Json summary = scored(folder, arguments);
+    std::vector<std::string> found;
+    for (const Json& one : summary["estimates"]) found.push_back(one["name"]);
+    return found;
+  };
+  CHECK(names({"a/one.tum", "b/two.tum"}) == std::vector<std::string>{"one", "two"});
+  CHECK(names({"a/same.tum", "b/same.tum"}) == std::vector<std::string>{"a", "b"});
+  CHECK(names({"a/c/same.tum", "b/c/same.tum"}) ==
+        std::vector<std::string>{(folder / "a/c/same.tum").string(), (folder / "b/c/same.tum").string()});
+}
+
 TEST_CASE("cairn_eval: --version and --help say what they are asked, or that they cannot") {
   cairn_test::check_version_and_help(
       [](const std::string& arguments, const std::string& output) { return run(arguments, output); },

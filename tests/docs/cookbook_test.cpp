@@ -3,6 +3,7 @@
 //
 // The programs of docs/cookbook.md, each in a namespace of its own, where what they include is already
 // included: compiled together and run; each returns 0 only if its answer is right.
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <iostream>
@@ -32,13 +33,15 @@
 #include <cairn/index/multi_tree_file.hpp>
 #include <cairn/index/ratio_test.hpp>
 #include <cairn/manifold/product.hpp>
+#include <cairn/manifold/se2.hpp>
 #include <cairn/manifold/so2.hpp>
 #include <cairn/manifold/so3.hpp>
 #include <cairn/models/linear.hpp>
 #include <cairn/models/motion.hpp>
 #include <cairn/models/sensor.hpp>
+#include <cairn/vision/surf.hpp>
 
-#define main recipe  // NOLINT: a program has one main, and this one has fourteen programs
+#define main recipe  // NOLINT: a program has one main, and this one has fifteen programs
 
 namespace docs_cookbook_test {
 
@@ -78,11 +81,14 @@ namespace growing_cloud {
 namespace descriptors {
 #include "snippets/docs/cookbook_12.inc"
 }  // namespace descriptors
-namespace stereo_pose {
+namespace two_images {
 #include "snippets/docs/cookbook_13.inc"
+}  // namespace two_images
+namespace stereo_pose {
+#include "snippets/docs/cookbook_14.inc"
 }  // namespace stereo_pose
 namespace trajectory_score {
-#include "snippets/docs/cookbook_14.inc"
+#include "snippets/docs/cookbook_15.inc"
 }  // namespace trajectory_score
 
 #undef main
@@ -100,6 +106,7 @@ TEST_CASE("docs: every program of the cookbook gives the answer that it checks f
   CHECK(own_points::recipe() == 0);
   CHECK(growing_cloud::recipe() == 0);
   CHECK(descriptors::recipe() == 0);
+  CHECK(two_images::recipe() == 0);
   CHECK(stereo_pose::recipe() == 0);
   CHECK(trajectory_score::recipe() == 0);
 }

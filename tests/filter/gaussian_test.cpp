@@ -34,6 +34,8 @@ TEST_CASE("gaussian: its state is deduced from a mean, and from what Eigen has y
   static_assert(std::same_as<decltype(at_run_time), const Gaussian<Vector<cairn::dynamic>>>);
   CHECK(at_run_time.mean.sum() == 3);
 
+  CHECK(cairn::nees(at_zero, 10 * Vector<4>::Ones()) == 4);  // an expression is a truth too
+
   const Gaussian of_floats{Vector<2, float>::Zero(), Matrix<2, 2, float>::Identity()};
   static_assert(std::same_as<decltype(of_floats), const Gaussian<Vector<2, float>>>);
   CHECK(of_floats.covariance.trace() == 2);

@@ -148,6 +148,17 @@ TEST_SUITE("points") {
     CHECK(Tree(none).empty());
   }
 
+  TEST_CASE("points: flat memory says its own scalar") {
+    const std::vector<float> numbers{1, 2, 3, 4, 5, 6};
+    const cairn::Rows rows(numbers, 3);
+    static_assert(std::same_as<decltype(rows), const cairn::Rows<float>>);
+    CHECK(rows.size() == 2);
+    CHECK(rows[1][0] == 4);
+    const std::array<double, 4> others{1, 2, 3, 4};
+    static_assert(std::same_as<decltype(cairn::Rows(std::span(others), 2)), cairn::Rows<double>>);
+    static_assert(std::same_as<decltype(cairn::Rows(others, 2)), cairn::Rows<double>>);
+  }
+
   TEST_CASE("points: Eigen vectors, and the columns of a matrix without a copy") {
     std::vector<Eigen::Vector3d> vectors;
     Eigen::Matrix3Xf matrix(3, 4);

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <string>
+#include <type_traits>
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/factor.hpp>
@@ -179,7 +180,7 @@ Gaussian<X> Gaussian<X>::checked(const X& mean, const Covariance& covariance) {
 /// Where P is singular its pseudo-inverse stands for P^-1, and the result is infinity for an error in a
 /// direction without variance, one that exceeds the deviation that the rounding of P may hide.
 template <Manifold X>
-[[nodiscard]] ScalarOf<X> nees(const Gaussian<X>& belief, const X& truth) {
+[[nodiscard]] ScalarOf<X> nees(const Gaussian<X>& belief, const std::type_identity_t<X>& truth) {
   CAIRN_EXPECTS(detail::common_size(belief.mean, belief.covariance) == dof_of(truth),
                 "nees needs a covariance and a truth of the mean's size");
   const Tangent<X> d = local(belief.mean, truth);

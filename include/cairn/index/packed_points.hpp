@@ -18,7 +18,8 @@
 /// 2nd ed., (3.5)), whose distance is computed from differences, as a kd-tree does it. The answers are those
 /// of BruteForce, the same for any number of threads. O(n) a query, with a small constant: docs/index.md says
 /// where trees begin to win. Far from the origin, where |p| is a thousand times the distances, the margin
-/// lets everything through and the speed is that of differences.
+/// lets everything through and the speed is that of differences. Points are kept as floats: doubles are
+/// rounded (KdTree keeps them).
 #pragma once
 
 #include <algorithm>

@@ -168,6 +168,11 @@ private:
   std::span<const Scalar> numbers_;
   std::size_t dim_;
 };
+/// Of a vector, an array, a span: the scalar is that of its numbers.
+template <std::ranges::contiguous_range Numbers>
+  requires(!detail::MatrixInMemory<std::remove_cvref_t<Numbers>> &&
+           std::is_arithmetic_v<std::ranges::range_value_t<Numbers>>)
+Rows(Numbers&&, std::size_t) -> Rows<std::ranges::range_value_t<Numbers>>;
 
 /// Memory seen as points that lie at even steps: coordinate a of point i is first[i point_step + a
 /// axis_step].
