@@ -31,9 +31,9 @@ struct Kalman {
   double fading = 1.0;             ///< fading memory: F P F^T is multiplied by this each step; >= 1
   double stabilising_noise = 0.0;  ///< variance added to every state at each predict; >= 0
 
-  /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite. Whether the belief's covariance
-  /// and the noise are covariances is not looked at here, for speed (update() refuses what is indefinite): ask
-  /// Gaussian::checked() where they come from outside.
+  /// Moves the belief by one step of dt. Refused: dt < 0, anything not finite. Whether the belief's
+  /// covariance and the noise are covariances is not looked at here, for speed (update() refuses what is
+  /// indefinite): ask Gaussian::checked() where they come from outside.
   template <class F, class U = detail::ControlOf<F>>
     requires(LinearProcess<F> || detail::explain_process<F> || detail::explain_linear<F, ProcessModel<F>>)
   Status predict(Gaussian<typename F::State>& belief, const F& process, double dt,

@@ -12,10 +12,11 @@
 ///   V_k = (L - G_k F L)(L - G_k F L)^T + G_k W (G_k W)^T
 /// G brings back what the state after says. Of a direction that has less than 2e-13 of the variance of the
 /// numbers it is made of, P(k+1|k) and P(k+1|T) as matrices say nothing: nothing is brought back from there,
-/// and what the state after would have said of it is not known of the smoothed moment. So units matter: choose
-/// them so that the deviations of a record are within a thousand of each other (docs/filters.md has figures).
-/// (H. Rauch, F. Tung, C. Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA Journal 3,
-/// 1965; S. Sarkka, "Unscented Rauch-Tung-Striebel smoother", IEEE Trans. Automatic Control 53, 2008.)
+/// and what the state after would have said of it is not known of the smoothed moment. So units matter:
+/// choose them so that the deviations of a record are within a thousand of each other (docs/filters.md has
+/// figures). (H. Rauch, F. Tung, C. Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA
+/// Journal 3, 1965; S. Sarkka, "Unscented Rauch-Tung-Striebel smoother", IEEE Trans. Automatic Control 53,
+/// 2008.)
 ///
 /// ```cpp
 /// cairn::Recorder recorder(cairn::Kalman{}, prior);

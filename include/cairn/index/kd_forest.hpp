@@ -19,9 +19,9 @@
 ///
 /// Turned coordinates are rounded, which moves a point by up to a known length. Therefore points are turned
 /// about their mean, trees are searched that much farther than the collector's limit, and whoever is met
-/// there is measured by the coordinates given as floats, as BruteForce<float> does: doubles, which descriptors
-/// need not be, are rounded. The rounding of a rotation is bounded in
-/// Higham, "Accuracy and stability of numerical algorithms", 2nd ed., section 3.5.
+/// there is measured by the coordinates given as floats, as BruteForce<float> does: doubles, which
+/// descriptors need not be, are rounded. The rounding of a rotation is bounded in Higham, "Accuracy and
+/// stability of numerical algorithms", 2nd ed., section 3.5.
 #pragma once
 
 #include <algorithm>
