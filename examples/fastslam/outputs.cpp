@@ -139,7 +139,10 @@ void add_map(example::Report& page, const Results& r) {
     plot.curves.push_back(curve_of("GPS", Ink::measurement, r.gps, T, true));
     plot.caption +=
         " GPS, which was not used, is moved rigidly onto the path: half of its fixes are within " +
-        readable(*r.gps_median) + " m of it. The receiver jumps, and was out for a part of the way.";
+        readable(*r.gps_median) +
+        " m of the part of it where the wheels had turned as far. The receiver jumps, and was out for a part "
+        "of "
+        "the way.";
   }
   plot.curves.push_back(curve_of("path", Ink::belief, places_of(r.mean), T));
   if (!r.true_landmarks.empty())
@@ -206,8 +209,14 @@ void add_film(example::Report& page, const Results& r) {
       .title = "Particles and their landmarks over time",
       .caption =
           "The paths of a dozen particles, and the best one's landmarks with ellipses of two standard "
-          "deviations. A little while back the paths lie on each other: all particles but one have died out "
-          "there, and the filter has made up its mind." +
+          "deviations. " +
+          std::string(
+              std::ranges::any_of(r.steps, [](const StepRecord& s) { return s.redrawn.has_value(); })
+                  ? "When too few ancestors are left all paths are drawn again: where they fan out far "
+                    "back it is by what the log leaves open. Where they lie on each other only one has "
+                    "descendants yet."
+                  : "A little while back the paths lie on each other: all particles but one have died "
+                    "out there, and the filter has made up its mind.") +
           std::string(r.truth.empty()
                           ? ""
                           : " All are moved by the one rigid motion that lays the mean path on the "

@@ -120,25 +120,60 @@ void measure_landmarks(Results& r, const LandmarkLog& log) {
   r.landmark_error = rms(found, is, *r.T_truth_landmarks);
 }
 
-/// GPS beside the path. The receiver of such a car jumps by tens of metres: the motion is fitted to the fixes
-/// that are nearest to the path, four fifths of them, ten times over.
+/// A path with the way gone at each of its places.
+struct Track {
+  std::vector<Vector<2>> places{};
+  std::vector<double> way{};  ///< [m]
+};
+Track track_of(const std::vector<StampedPose2>& path) {
+  Track track{places_of(path), {0}};
+  for (std::size_t i = 1; i < track.places.size(); ++i)
+    track.way.push_back(track.way.back() + (track.places[i] - track.places[i - 1]).norm());
+  return track;
+}
+/// The point nearest to p of what is driven up to `reach` metres before and after a place of the track.
+Vector<2> nearest_about(const Track& track, std::size_t place, const Vector<2>& p, double reach) {
+  Vector<2> nearest = track.places[place];
+  const auto from = std::ranges::lower_bound(track.way, track.way[place] - reach) - track.way.begin();
+  for (auto i = static_cast<std::size_t>(from);
+       i + 1 < track.places.size() && track.way[i + 1] <= track.way[place] + reach; ++i) {
+    const Vector<2> step = track.places[i + 1] - track.places[i];
+    const double length2 = step.squaredNorm();
+    const double share = length2 > 0 ? (p - track.places[i]).dot(step) / length2 : 0;
+    const Vector<2> at = track.places[i] + std::clamp(share, 0.0, 1.0) * step;
+    if ((at - p).squaredNorm() < (nearest - p).squaredNorm()) nearest = at;
+  }
+  return nearest;
+}
+
+/// GPS beside the path. When a fix was taken is known by how far the wheels had turned, which slip: it is
+/// held against what is driven within 30 m of there, once all lie on those places as well as they can. The
+/// receiver of such a car jumps by tens of metres: the motion is fitted to the fixes that are nearest to the
+/// path, four fifths of them, ten times over for either.
 void measure_gps(Results& r, const LandmarkLog& log) {
+  constexpr double reach = 30;
+  const Track track = track_of(r.mean);
   std::vector<Vector<2>> fixes, path;
+  std::vector<std::size_t> places;
   for (const GpsFix& fix : log.gps)
     if (const StampedPose2* pose = last_until(r.mean, fix.time);
         pose != nullptr && fix.time <= r.mean.back().time) {
       fixes.push_back(fix.place);
-      path.push_back(pose->pose.translation());
+      places.push_back(static_cast<std::size_t>(pose - r.mean.data()));
+      path.push_back(track.places[places.back()]);
     }
   if (fixes.size() < 4) return;
   std::vector<std::size_t> order(fixes.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   SE2 fit = rigid_fit(fixes, path);
   std::vector<double> distance(fixes.size());
-  for (int round = 0; round <= 10; ++round) {
-    for (std::size_t i = 0; i < fixes.size(); ++i) distance[i] = (fit * fixes[i] - path[i]).norm();
+  for (int round = 0; round <= 20; ++round) {
+    for (std::size_t i = 0; i < fixes.size(); ++i) {
+      if (round >= 10) path[i] = nearest_about(track, places[i], fit * fixes[i], reach);
+      distance[i] = (fit * fixes[i] - path[i]).norm();
+    }
     std::ranges::sort(order, {}, [&](std::size_t i) { return std::pair(distance[i], i); });
-    if (round == 10) break;
+    if (round == 20) break;
     std::vector<Vector<2>> from, to;
     for (std::size_t k = 0; k < order.size() * 4 / 5; ++k) {
       from.push_back(fixes[order[k]]);

@@ -481,8 +481,10 @@ Results run(const LandmarkLog& log, const SlamOptions& options,
       if (const double nees = cairn::nees(r.steps.back().pose, log.start->inverse() * truth->pose);
           std::isfinite(nees))  // one particle that was drawn again has no covariance
         r.steps.back().nees = nees;
-    if (odometry.size() % every == 0) r.snapshots.push_back(snapshot_of(belief, frame.time));
     if (on_frame) r.ended_early = on_frame();
+    // The last is what is handed over: the film ends with it.
+    if (odometry.size() % every == 0 || is_last || r.ended_early)
+      r.snapshots.push_back(snapshot_of(belief, frame.time));
     if (r.ended_early) break;
   }
   r.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -107,8 +107,8 @@ TEST_CASE("lost_stretch: frames between others lie on the motion between them, a
     CHECK((frames[i].covariance(0, 0) > 1e-4) == lost);
   }
   // A unit acceleration in the middle of 0.4 s, and a quarter in.
-  CHECK(frames[5].covariance(2, 2) == doctest::Approx(1e-4 + std::pow(0.2, 4) / 1.2));
-  CHECK(frames[4].covariance(5, 5) == doctest::Approx(1e-4 + std::pow(0.1 * 0.3, 2) / 1.2));
+  CHECK(frames[5].covariance(2, 2) == doctest::Approx(1e-4 + std::pow(0.2, 4) / 1.2).scale(0));
+  CHECK(frames[4].covariance(5, 5) == doctest::Approx(1e-4 + std::pow(0.1 * 0.3, 2) / 1.2).scale(0));
 }
 
 TEST_CASE(

@@ -78,7 +78,7 @@ TEST_CASE("reference_mounting: height does not count in a level drive") {
   for (stereo_slam::FrameRecord& frame : run.frames)
     frame.truth =
         *frame.truth * cairn::SE3({}, cairn::Vector<3>(0, 0.02 * static_cast<double>(frame.index), 0));
-  CHECK(*stereo_slam::level_nees(run.frames, 0) == doctest::Approx(before).epsilon(0.3));
+  CHECK(*stereo_slam::level_nees(run.frames, 0) == doctest::Approx(before).epsilon(0.3).scale(0));
   CHECK(stereo_slam::mounted_consistency(run.frames, 0)->nees_as_given > 100);
 }
 

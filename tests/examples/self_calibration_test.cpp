@@ -109,7 +109,7 @@ TEST_SUITE("self_calibration") {
     const int last = 40 + 5000;
     CHECK_FALSE(calibration.observe(last, SE3(), {}));  // in the dark since
     const double expected = before + 5000 * options.walk_rotation * options.walk_rotation;
-    CHECK(calibration.now().covariance()(1, 1) == doctest::Approx(expected).epsilon(0.01));
+    CHECK(calibration.now().covariance()(1, 1) == doctest::Approx(expected).epsilon(0.01).scale(0));
   }
 
   TEST_CASE("SelfCalibration: nothing to see, nothing to correct") {

@@ -183,10 +183,10 @@ TEST_SUITE("calibration_drift") {
       }
       const CalibrationDrift then = start.ahead(frames);
       for (int i = 0; i < 3; ++i) {
-        CHECK(then.covariance()(i, i) == doctest::Approx(ww).epsilon(1e-4));
-        CHECK(then.rate_covariance()(i, i) == doctest::Approx(rr).epsilon(1e-4));
+        CHECK(then.covariance()(i, i) == doctest::Approx(ww).epsilon(1e-4).scale(0));
+        CHECK(then.rate_covariance()(i, i) == doctest::Approx(rr).epsilon(1e-4).scale(0));
       }
-      CHECK(then.covariance()(4, 4) == doctest::Approx(tt).epsilon(1e-4));
+      CHECK(then.covariance()(4, 4) == doctest::Approx(tt).epsilon(1e-4).scale(0));
       CHECK(then.covariance()(0, 1) == 0.0);
       // In one go or frame by frame: w, its rate, and, by what comes next, both together.
       CalibrationDrift stepped = start;
@@ -199,7 +199,8 @@ TEST_SUITE("calibration_drift") {
       const CalibrationDrift turning(cairn_test::rectified_rig(),
                                      {.walk_rotation = 0, .rate_sigma = 1e-4, .rate_memory = memory});
       const double turned = memory < 1 ? 0 : 300 * 1e-4;
-      CHECK(turning.ahead(300).covariance()(0, 0) == doctest::Approx(1e-6 + turned * turned).epsilon(1e-9));
+      CHECK(turning.ahead(300).covariance()(0, 0) ==
+            doctest::Approx(1e-6 + turned * turned).epsilon(1e-9).scale(0));
     }
     CHECK(start.ahead(0).covariance() == start.covariance());
     CHECK(cairn_test::violation_of([&] { (void)start.ahead(-1); }) == "CalibrationDrift: cannot go back");

@@ -13,9 +13,7 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/random.hpp>
 #include <cairn/core/statistics.hpp>
-#include <cairn/filter/extended.hpp>
 #include <cairn/filter/gaussian.hpp>
-#include <cairn/filter/unscented.hpp>
 #include <cairn/geometry/anchored_line.hpp>
 #include <cairn/geometry/line.hpp>
 #include <cairn/geometry/line_triangulation.hpp>

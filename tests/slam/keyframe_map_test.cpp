@@ -314,11 +314,11 @@ TEST_SUITE("keyframe_map") {
     const Matrix<n> of_rig = expected.bottomRightCorner<n, n>();
     for (int k = 0; k < n; ++k) {
       CAPTURE(k);
-      CHECK(rig->covariance(k, k) == doctest::Approx(of_rig(k, k)).epsilon(0.1));
+      CHECK(rig->covariance(k, k) == doctest::Approx(of_rig(k, k)).epsilon(0.2).scale(0));
     }
-    CHECK(of_rig(2, 2) < 0.5 * 1e-6);                            // the right camera's roll is seen
-    CHECK(of_rig(7, 7) < 0.1 * 4e-6);                            // and the ratio of the focal lengths
-    CHECK(of_rig(5, 5) == doctest::Approx(1e-6).epsilon(1e-3));  // the size of the world is not
+    CHECK(of_rig(2, 2) < 0.5 * 1e-6);  // the right camera's roll is seen
+    CHECK(of_rig(7, 7) < 0.1 * 4e-6);  // and the ratio of the focal lengths
+    CHECK(of_rig(5, 5) == doctest::Approx(1e-6).epsilon(1e-3).scale(0));  // the size of the world is not
     CHECK(most_off(map.covariance(), expected.topLeftCorner(24, 24)) < 0.08);
     // The landmarks are as uncertain as the rig makes them, singly and together.
     const std::vector<std::uint32_t> ids{3, 40, 17, 8};

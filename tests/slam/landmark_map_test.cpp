@@ -64,6 +64,30 @@ double squared_error_where_copies_differ(const Drive& d, std::size_t count, std:
   });
 }
 
+/// Covariances of the pose and of each landmark over all particles: means of a particle's own and the spread
+/// of its means, in the order of the joint filter's rows.
+std::vector<Matrix<2>> covariances(const Drive& d, std::size_t count, std::uint64_t seed) {
+  std::vector<Matrix<2>> found;
+  squared_error(d, count, seed, {}, {}, [&](const auto& belief, const auto&) {
+    const std::vector<double> weights = belief.particles().weights();
+    found.assign(1 + landmarks.size(), Matrix<2>::Zero());
+    std::vector<Plane> mean(found.size(), Plane::Zero());
+    const auto each = [&](const auto& visit) {
+      for (std::size_t i = 0; i < count; ++i) {
+        visit(weights[i], 0, Gaussian<Plane>{belief[i].pose, Matrix<2>::Zero()});
+        for (const auto& [id, row] : d.exact.row_of)
+          visit(weights[i], static_cast<std::size_t>(row) / 2, belief[i].map.find(id)->belief);
+      }
+    };
+    each([&](double w, std::size_t of, const Gaussian<Plane>& b) { mean[of] += w * b.mean; });
+    each([&](double w, std::size_t of, const Gaussian<Plane>& b) {
+      const Plane off = b.mean - mean[of];
+      found[of] += w * (b.covariance + off * off.transpose());
+    });
+  });
+  return found;
+}
+
 /// A map of the landmarks as seen once from the origin.
 template <class M = Map>
 M seen_once(Random& random, const LandmarkOptions& options = keep_all) {
@@ -168,8 +192,33 @@ TEST_SUITE("slam/landmark_map") {
     const Drive d = drive(seed);
     const double slope = slope_of_error(d, seed);
     MESSAGE("slope ", slope);
-    CHECK(slope == doctest::Approx(-0.5).epsilon(0.2));  // +-0.1
+    CHECK(std::abs(slope + 0.5) < 0.1);
     CHECK(std::sqrt(squared_error(d, 3000, seed)) < 0.2);
+  }
+
+  TEST_CASE(
+      "landmark_map: the particles' spread and their landmarks' covariances make up the exact covariances") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    const Drive d = drive(seed);
+    const std::vector<Matrix<2>> found = covariances(d, 3000, seed);
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const Matrix<2> exact = d.exact.covariance.block<2, 2>(Eigen::Index(2 * i), Eigen::Index(2 * i));
+      CAPTURE(i);
+      CHECK((found[i] - exact).norm() < 0.2 * exact.norm());
+    }
+  }
+
+  TEST_CASE(
+      "landmark_map: a sighting of a number that the map does not have is clutter, and changes nothing") {
+    Random random(5);
+    Map map = seen_once(random);
+    const std::size_t before = map.size();
+    const Map::Observation z{{Plane(1, 1), {}}};
+    CHECK(map.log_likelihood(Plane::Zero(), z, {77}) == map.log_density_of(no_landmark));
+    map.insert(Plane::Zero(), z, {77});
+    CHECK(map.size() == before);
+    CHECK(map.find(77) == nullptr);
   }
 
   TEST_CASE(

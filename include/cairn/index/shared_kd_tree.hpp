@@ -8,10 +8,11 @@
 /// or erasure copies the branches and the leaf on its way that others hold (J. Driscoll, N. Sarnak,
 /// D. Sleator, R. Tarjan, "Making data structures persistent", JCSS 38, 1989, sec. 2: path copying). Where a
 /// way grows longer than twice the logarithm of what is below, that part is built anew (I. Galperin,
-/// R. Rivest, "Scapegoat trees", SODA 1993): O(log n) amortised. Different trees may be used from different
-/// threads at once also where they share nodes. Of many points at the very same place erase() looks at up to
-/// all. Where memory ends within insert() or erase(), that tree is to be given up; its copies are as they
-/// were.
+/// R. Rivest, "Scapegoat trees", SODA 1993): O(log n) amortised over the changes of one tree. Where that
+/// falls due in a part which many copies share, each builds and keeps its own. Different trees may be used
+/// from different threads at once also where they share nodes. Of many points at the very same place erase()
+/// looks at up to all. Where memory ends within insert() or erase(), that tree is to be given up; its copies
+/// are as they were.
 #pragma once
 
 #include <algorithm>

@@ -272,7 +272,7 @@ public:
   [[nodiscard]] Chosen<Choice> choose(const Pose& x, const Observation& z, Random& random) const {
     return associate(known(x), z, random);
   }
-  /// log p(z, n | x, m)
+  /// log p(z, n | x, m). A number that the map does not have is no_landmark.
   [[nodiscard]] double log_likelihood(const Pose& x, const Observation& z, const Choice& n) const;
   /// log p(z, n | x, m) of the likeliest n.
   [[nodiscard]] double log_likelihood(const Pose& x, const Observation& z) const {
@@ -289,8 +289,9 @@ public:
   }
 
   /// Takes the sightings in: updates, new landmarks, and the odds of what was not seen though in view. Throws
-  /// Error, and has changed nothing, where an identity is too large; what is not finite is passed over. An
-  /// observation without sightings changes nothing: it may be that nobody looked.
+  /// Error, and has changed nothing, where an identity is too large; what is not finite is passed over, and
+  /// so is a sighting of a number that the map does not have (any longer): clutter, as log_likelihood() has
+  /// it. An observation without sightings changes nothing: it may be that nobody looked.
   void insert(const Pose& x, const Observation& z, const Choice& n);
   /// The same with the likeliest association at this pose.
   void insert(const Pose& x, const Observation& z) {
