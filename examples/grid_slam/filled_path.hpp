@@ -18,7 +18,8 @@
 namespace grid_slam {
 
 /// Between the processed scans the path follows odometry, and the gap to the next one is spread along the
-/// way: by metres plus radians, for a robot that stands does not err. `processed(k)` is the scan of pose(k),
+/// way: by metres plus radians, for a robot that stands does not err, and evenly where odometry saw no way at
+/// all. `processed(k)` is the scan of pose(k),
 /// in rising order, from the first scan on. Scans lag behind odometry by `delay`, in scans.
 template <class Processed, class Pose>
 [[nodiscard]] std::vector<cairn::StampedPose2> filled_path(const std::vector<cairn::StampedScan>& scans,
@@ -45,7 +46,8 @@ template <class Processed, class Pose>
     for (std::size_t i = from; i < to && i + 1 < scans.size(); ++i) whole += way(i);
     for (std::size_t i = from; i < to; ++i) {
       const SE2 moved = pose(k) * (back * odometry[i]);
-      const double share = whole > 0 ? gone / whole : 0;
+      const double share =
+          whole > 0 ? gone / whole : static_cast<double>(i - from) / static_cast<double>(to - from);
       all.push_back({scans[i].time, cairn::retract(moved, Vector<3>(share * gap))});
       if (i + 1 < to) gone += way(i);
     }

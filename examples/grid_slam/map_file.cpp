@@ -89,7 +89,7 @@ void parts(Archive& archive, Asked& a) {
 namespace {
 
 constexpr std::string_view kind = "cairngrd";
-constexpr std::uint64_t version = 4;
+constexpr std::uint64_t version = 5;
 
 /// Grids that share tiles: every tile once, and for each grid the numbers of its own.
 template <class Cell>
@@ -214,6 +214,7 @@ void Mapper::plain_parts(Archive& archive, Mapper& m) {
   archive(m.steps_, m.points_, m.travelled_, m.scans_, m.loops_);
   archive(m.motion_.distance, m.motion_.angle, m.motion_.stood, m.delay_);
   archive(m.looked_, m.asked_);
+  archive(m.unseen_.still_since, m.unseen_.steps, m.unseen_.newest);
 }
 
 void Mapper::expect_sound(const Reader& reader) const {
@@ -224,6 +225,7 @@ void Mapper::expect_sound(const Reader& reader) const {
     reader.refuse("the steps are not in the order of the scans");
   if (!growing(travelled_) || !(motion_.distance >= 0 && motion_.angle >= 0))
     reader.refuse("the way travelled is not one");
+  if (unseen_.still_since >= scans_.size()) reader.refuse("odometry stands since a scan that there is not");
   if (!delay_.is_distribution()) reader.refuse("the shares of the scans' delays do not sum to one");
   if (asked_ && !(asked_->since >= 0 && asked_->since <= asked_->at))
     reader.refuse("a look came before its first");

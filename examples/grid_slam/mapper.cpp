@@ -40,6 +40,27 @@ std::vector<SE2> poses_on(const std::vector<cairn::PathPose<SE2>>& path) {
   return poses;
 }
 
+/// Scans: none lags so far behind odometry.
+constexpr std::size_t longest_delay = 4;
+
+/// Of a step of odometry from one scan to the next: less than any wheel's least count.
+bool is_still(const SE2& moved) {
+  return moved.translation().norm() < 1e-4 && std::abs(moved.angle()) < 1e-4;
+}
+
+/// Of the beams that came back in both scans the share that did so from elsewhere; 0 where beams are others.
+double share_of_changed(const cairn::LaserScan& a, const cairn::LaserScan& b) {
+  if (a.size() != b.size() || a.angle_step != b.angle_step || a.first_angle != b.first_angle) return 0;
+  double both = 0, changed = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (a.kind(i) != cairn::BeamKind::hit || b.kind(i) != cairn::BeamKind::hit) continue;
+    const auto before = static_cast<double>(a.range[i]), now = static_cast<double>(b.range[i]);
+    both += 1;
+    changed += std::abs(now - before) > 0.1 + 0.02 * now ? 1 : 0;
+  }
+  return both > 0 ? changed / both : 0;
+}
+
 /// Points of several scans, seen from the last pose.
 std::vector<ScanPoint> seen_together(const std::vector<SE2>& poses,
                                      const std::vector<std::vector<ScanPoint>>& points, std::size_t first,
@@ -116,21 +137,24 @@ cairn::Gaussian<SE2> Mapper::newest() const {
 bool Mapper::add(const cairn::StampedScan& scan) {
   const Motion before = motion_;
   const std::size_t steps = steps_.size();
-  bool due = scans_.empty();
+  bool due = scans_.empty(), stopped = false;
   if (due) {
     begin(scan);
   } else {
     const SE2 moved = scans_.back().T_odom_laser.inverse() * scan.T_odom_laser;
     accumulate(moved);
     // Where the robot stops the direction may change, so no step goes on beyond that.
-    const bool stands = moved.translation().norm() < options_.standstill;
+    stopped = stands(scan);
     due = motion_.distance >= options_.step_distance || motion_.angle >= options_.step_angle ||
-          (stands && motion_.distance > 2 * options_.standstill);
-    if (!due && stands) motion_.stood = true;
+          (stopped && motion_.distance > 2 * options_.standstill);
+    if (!due && stopped) motion_.stood = true;
+    if (!is_still(moved)) unseen_.still_since = scans_.size();
   }
   scans_.push_back(scan);
+  const bool stuck = !due && odometry_is_stuck();
+  due = due || stuck;
   try {
-    if (due) process(scan);
+    if (due) process(scan, stopped, stuck);
   } catch (const std::exception&) {
     if (steps_.size() == steps) {  // the belief does not know of the scan
       scans_.pop_back();
@@ -140,6 +164,23 @@ bool Mapper::add(const cairn::StampedScan& scan) {
     throw;
   }
   return due;
+}
+
+bool Mapper::stands(const cairn::StampedScan& next) const {
+  constexpr std::size_t most = 32;  // copies: the times of some logs are all the same
+  std::size_t before = scans_.size() - 1;
+  while (before > 0 && scans_[before].time == next.time && scans_.size() - before < most) --before;
+  if (scans_[before].time == next.time) before = scans_.size() - 1;
+  const SE2 moved = scans_[before].T_odom_laser.inverse() * next.T_odom_laser;
+  return moved.translation().norm() < options_.standstill;
+}
+
+bool Mapper::odometry_is_stuck() const {
+  constexpr double many = 0.5;  // more than people around the robot hide and bare
+  const std::size_t settled = unseen_.still_since + longest_delay;
+  if (steps_.empty() || scans_.size() <= settled + 1) return false;
+  const std::size_t then = std::max(settled, steps_.back().scan);
+  return share_of_changed(scans_[then].scan, scans_.back().scan) > many;
 }
 
 void Mapper::begin(const cairn::StampedScan& scan) {
@@ -264,15 +305,14 @@ void Mapper::learn_delay(const Matrix<3>& noise) {
   delay_.learn(scans_, steps_.back().scan, scans_.size() - 1, moved.angle(), std::sqrt(noise(2, 2) + seen));
 }
 
-void Mapper::process(const cairn::StampedScan& scan) {
+void Mapper::process(const cairn::StampedScan& scan, bool stopped, bool stuck) {
   const std::size_t index = scans_.size() - 1;
   const bool first = steps_.empty();
   const Matrix<3> noise = motion_noise();
   const std::array<cairn::Gaussian<SE2>, 2> ways =
       first ? std::array<cairn::Gaussian<SE2>, 2>{} : std::array{motion_step(true), motion_step(false)};
-  const bool stopped =
-      index > 0 && (scans_[index - 1].T_odom_laser.inverse() * scan.T_odom_laser).translation().norm() <
-                       options_.standstill;
+  // Where odometry does not see the robot move, it may be anywhere within reach; it is also when it moves on.
+  const bool unseen = stuck || unseen_.newest;
   const bool may_turn_back = motion_.stood && motion_.distance > 2 * options_.standstill;
   const double far = options_.slip_distance, round = options_.slip_angle;
   const Matrix<3> slipped = Vector<3>(far * far, far * far, round * round).asDiagonal();
@@ -283,6 +323,11 @@ void Mapper::process(const cairn::StampedScan& scan) {
       result.modes.push_back({way, share, {x * ways[way].mean, ways[way].covariance}});
     };
     const double turn = may_turn_back ? options_.turn_back : options_.turn_unseen;
+    if (unseen) {
+      mode(regime, 1);
+      result.modes.back().motion.covariance += slipped;
+      return result;
+    }
     mode(regime, 1 - turn - options_.slip);
     mode(1 - regime, turn);
     mode(regime, options_.slip);
@@ -311,7 +356,9 @@ void Mapper::process(const cairn::StampedScan& scan) {
   };
   const cairn::MappingStep step = filter.step(*belief_, motion, with_room, points_.back());
   if (!step.accepted()) refuse_step(step.status, all_have_room, options_.cell_size);
-  if (!first) learn_delay(noise);
+  if (!first && !unseen) learn_delay(noise);
+  unseen_.newest = stuck;
+  unseen_.steps += stuck ? 1 : 0;
   travelled_.push_back(travelled_.back() + motion_.distance);
   steps_.push_back({index, step.effective_size, step.resampled, false, belief_->pose()});
   const bool still_open = motion_.stood && !may_turn_back;  // it has only turned since it stood
@@ -493,7 +540,23 @@ void Mapper::move_paths() {
   steps_.back().moved = true;
 }
 
+std::optional<double> Mapper::explained() const {
+  if (!frozen_) return std::nullopt;
+  const auto path = belief().path(belief().best());
+  double all = 0, near = 0;
+  for (std::size_t k = 0; k < points_.size(); ++k) {
+    const auto count = static_cast<double>(points_[k].size());
+    near += count *
+            cairn::evaluate(frozen_->grid, points_[k], path[k + 1].drawn_from.mean, frozen_->model).matched;
+    all += count;
+  }
+  return all > 0 ? near / all : 0;
+}
+
 std::vector<cairn::StampedPose2> Mapper::trajectory(bool means) const {
+  // Where no scan says anything, the means of the steps follow the poses drawn before them, which is a walk.
+  if (means && std::ranges::all_of(points_, &std::vector<ScanPoint>::empty))
+    return odometry_from(belief().path(belief().best()).front().pose, scans_);
   const auto path = belief().path(belief().best());
   return filled_path(
       scans_, steps_.size(), [&](std::size_t k) { return steps_[k].scan; },

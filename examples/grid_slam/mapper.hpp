@@ -165,6 +165,12 @@ public:
   /// it, if any.
   [[nodiscard]] const std::vector<PossiblePlace>& places() const noexcept { return places_; }
 
+  /// Of a localiser that has taken a scan the share of all points so far that lie at the map's obstacles,
+  /// from the best particle's path; nothing of a mapper, whose scans made the map. O(points).
+  [[nodiscard]] std::optional<double> explained() const;
+  /// Steps that were made by scans alone, which moved on where odometry stood.
+  [[nodiscard]] std::size_t steps_unseen() const noexcept { return unseen_.steps; }
+
   /// A pose for every scan so far: of the best particle at the processed ones, along the odometry between.
   /// By the drawn poses, or by the means of the densities that they were drawn from.
   [[nodiscard]] std::vector<cairn::StampedPose2> trajectory(bool means) const;
@@ -178,6 +184,13 @@ private:
     bool stood = false;
   };
 
+  /// What odometry has not seen: scans that moved on where it stood.
+  struct Unseen {
+    std::size_t still_since = 0;  // scan; odometry has not moved after it
+    std::size_t steps = 0;
+    bool newest = false;  // the newest step is one of them
+  };
+
   template <class Archive>
   static void plain_parts(Archive& archive, Mapper& mapper);
   [[nodiscard]] static Mapper loaded(Reader& reader, const MapRequest& wanted);
@@ -185,7 +198,12 @@ private:
   void begin(const cairn::StampedScan& scan);
   [[nodiscard]] cairn::Gaussian<cairn::SE2> place_in_window(const cairn::StampedScan& scan);
   void accumulate(const cairn::SE2& moved);
-  void process(const cairn::StampedScan& scan);
+  /// Whether odometry moved too little for a robot on its way, from the scan before. Copies of a scan do not
+  /// tell, so the scan before is one of another time.
+  [[nodiscard]] bool stands(const cairn::StampedScan& next) const;
+  /// Whether the newest scan shows another place than the first ones where odometry stands.
+  [[nodiscard]] bool odometry_is_stuck() const;
+  void process(const cairn::StampedScan& scan, bool stopped, bool stuck);
   [[nodiscard]] cairn::Matrix<3> motion_noise() const;
   /// Of the step to the newest scan: what the delay leaves open of the turn is a part of the covariance.
   [[nodiscard]] cairn::Gaussian<cairn::SE2> motion_step(bool forwards) const;
@@ -233,6 +251,7 @@ private:
   std::vector<cairn::StampedScan> scans_;
   std::vector<Loop> loops_;
   Motion motion_;
+  Unseen unseen_;
   ScanDelay delay_;
   double looked_ = 0;  // travelled at the last look for a loop
   std::optional<Asked> asked_;

@@ -48,8 +48,7 @@ void end_of_data(Results& r, const cairn::CarmenLog& log, std::size_t next, cons
 void add_notes(Results& r, const std::vector<cairn::StampedScan>& scans) {
   if (!r.map.has_picture()) r.notes.push_back(why_no_picture(r.map));
   if (std::ranges::all_of(scans, [](const auto& each) { return cairn::scan_points(each.scan).empty(); }))
-    r.notes.emplace_back(
-        "no scan has a beam that came back: the map is empty, and the path is drawn from odometry alone");
+    r.notes.emplace_back("no scan has a beam that came back: the map is empty, and the path is odometry's");
 }
 
 Results run(Mapper& mapper, const cairn::CarmenLog& log, const std::vector<cairn::PoseRelation>& relations,
@@ -98,6 +97,15 @@ Results run(Mapper& mapper, const cairn::CarmenLog& log, const std::vector<cairn
   }
   measure(r, relations);
   add_notes(r, mapper.scans());
+  constexpr double enough = 0.5;  // of the points; moved furniture and people take a fifth or so away
+  if (const std::optional<double> explained = mapper.explained(); explained && *explained < enough)
+    r.notes.push_back(
+        "the map explains no more than " + cairn::shortest(std::round(100 * *explained)) +
+        " % of the scans' points: the robot is elsewhere, or began elsewhere (--window looks for the "
+        "place where it began)");
+  if (const std::size_t unseen = mapper.steps_unseen(); unseen > 0)
+    r.notes.push_back("scans moved on where odometry stood, " + std::to_string(unseen) +
+                      " times: these steps are by scans alone");
   return r;
 }
 

@@ -83,6 +83,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   check_number<std::uint64_t>(text);
   check_number<std::uint8_t>(text);
   const std::filesystem::path file = scratch.put("text", text);
+  try {
+    static_cast<void>(cairn::TextLines(file, "text"));
+  } catch (const cairn::Error&) {  // packed
+    return cairn_fuzz::refused();
+  }
   for (const char comment : {'#', '\0'})
     for (const char separator : {' ', ',', ';'}) check_lines(file, comment, separator);
   return 0;

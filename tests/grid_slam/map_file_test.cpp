@@ -63,7 +63,7 @@ std::string numbers_of(const std::filesystem::path& map) {
 std::string map_of(const std::string& numbers) {
   cairn::BinaryWriter out;
   for (const char c : numbers) out.put(c);
-  return out.file("cairngrd", 4);
+  return out.file("cairngrd", 5);
 }
 
 }  // namespace
@@ -181,14 +181,32 @@ TEST_SUITE("grid_slam/map_file") {
     CHECK(places >= 1);  // of the scan's odometry, and of what began there
   }
 
+  TEST_CASE(
+      "map_file: a localiser that began where the robot is not says that the map does not explain its "
+      "scans") {
+    const cairn_test::Folder folder;
+    const Drive drive = simulated_drive({.seed = 2});
+    Mapper mapper({.particles = 2, .seed = 2});
+    for (std::size_t i = 0; i < 200; ++i) mapper.add(drive.log.scans[i]);
+    CHECK_FALSE(mapper.explained().has_value());
+    mapper.save(folder / "map");
+    const auto explained_from = [&](std::size_t first) {  // it begins where the map ended
+      Mapper localiser = Mapper::localiser(folder / "map", {.particles = 10});
+      for (std::size_t i = first; i < first + 40; ++i) localiser.add(drive.log.scans[i]);
+      return localiser.explained().value();
+    };
+    CHECK(explained_from(200 - 1) > 0.6);
+    CHECK(explained_from(60) < 0.5);
+  }
+
   TEST_CASE("map_file: shares of the delays that do not sum to one are refused in words") {
     const cairn_test::Folder folder;
     Mapper mapper({.particles = 1});
     mapper.add(simulated_drive({.seed = 2}).log.scans.front());
     mapper.save(folder / "map");
     std::string numbers = numbers_of(folder / "map");
-    // They stand before the two numbers on looks for loops that end the file.
-    const std::size_t at = numbers.size() - 1 - 8 - 8 * ScanDelay::count;
+    // They stand before two numbers on looks for loops and three on steps that odometry did not see.
+    const std::size_t at = numbers.size() - 17 - 1 - 8 - 8 * ScanDelay::count;
     double share = 0, sum = 0;
     for (std::size_t k = 0; k < ScanDelay::count; ++k) {
       std::memcpy(&share, numbers.data() + at + 8 * k, 8);

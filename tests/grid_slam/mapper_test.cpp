@@ -101,6 +101,48 @@ Evidence evidence(const Seen& seen, const Gaussian<SE2>& motion) {
 }  // namespace
 
 TEST_SUITE("grid_slam/mapper") {
+  TEST_CASE("mapper: where odometry stands though the robot drives, the path follows the scans") {
+    Drive drive = short_drive(4, 300);
+    std::vector<StampedScan>& scans = drive.log.scans;
+    const std::vector<StampedScan> moving = scans;
+    SE2 odometry = moving[0].T_odom_laser;
+    for (std::size_t i = 1; i < scans.size(); ++i) {
+      const bool frozen = i > 100 && i % 60 < 12;  // for a metre, where not all walls are along the way
+      if (!frozen) odometry = odometry * (moving[i - 1].T_odom_laser.inverse() * moving[i].T_odom_laser);
+      scans[i].T_odom_laser = scans[i].T_odom_robot = odometry;
+    }
+    const Results r = run(drive.log, {.particles = 8, .seed = cairn_test::seed()}, {});
+    const auto off = [&](const std::vector<StampedPose2>& path) {
+      const SE2 moved = path.front().pose.inverse() * path.back().pose;
+      return local(SE2(drive.truth.front().inverse() * drive.truth.back()), moved).norm();
+    };
+    CHECK(off(r.odometry) > 3);
+    CHECK(off(r.means) < 1.3);
+    CHECK(r.notes.size() == 1);
+  }
+
+  TEST_CASE("mapper: copies of scans change nothing") {
+    const Drive drive = short_drive(5, 200);
+    Mapper single({.particles = 4, .seed = 3}), thrice({.particles = 4, .seed = 3});
+    for (const StampedScan& scan : drive.log.scans) {
+      const bool due = single.add(scan);
+      CHECK(thrice.add(scan) == due);
+      CHECK_FALSE(thrice.add(scan));
+      CHECK_FALSE(thrice.add(scan));
+    }
+  }
+
+  TEST_CASE("mapper: without a beam that came back the path is odometry's, for any seed") {
+    Drive drive = short_drive(6, 100);
+    for (StampedScan& each : drive.log.scans) std::ranges::fill(each.scan.range, 81.91F);
+    const Results r = run(drive.log, {.particles = 4, .seed = cairn_test::seed()}, {});
+    for (std::size_t i = 0; i < r.means.size(); ++i)
+      CHECK(local(r.means[0].pose.inverse() * r.means[i].pose,
+                  r.odometry[0].pose.inverse() * r.odometry[i].pose)
+                .norm() < 1e-9);
+    CHECK(r.notes.back().find("the path is odometry's") != std::string::npos);
+  }
+
   TEST_CASE("mapper: the proposal's exact weight integrates to what a lattice of poses gives, mean and all") {
     const Seen seen = seen_in_the_corridor();
     const Gaussian<SE2> motion = moved_by(seen, Vector<3>(0.02, -0.02, 0.01));

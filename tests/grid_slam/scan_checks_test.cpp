@@ -3,17 +3,22 @@
 #include "scan_checks.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <cstddef>
 #include <cstdlib>
+#include <numbers>
 #include <string>
 #include <vector>
 
 #include <doctest/doctest.h>
 
+#include <cairn/core/random.hpp>
 #include <cairn/io/carmen.hpp>
 
 #include "floor_plan.hpp"
 #include "support/data.hpp"
 #include "support/folder.hpp"
+#include "support/random.hpp"
 
 namespace scan_checks_test {
 namespace {
@@ -94,6 +99,64 @@ TEST_SUITE("grid_slam/scan_checks") {
     const std::vector<std::string> notes = check_scans(centimetres, "log");
     REQUIRE(notes.size() == 1);
     CHECK(notes[0].find("are the ranges metres?") != std::string::npos);
+  }
+
+  TEST_CASE("grid_slam: headings in degrees are refused, with what to do") {
+    cairn::CarmenLog log = drive_with([](float r) { return r; });
+    for (cairn::StampedScan& each : log.scans) {
+      const cairn::SE2& pose = each.T_odom_laser;
+      each.T_odom_laser = cairn::SE2(pose.x(), pose.y(), pose.angle() * 180 / std::numbers::pi);
+    }
+    const std::string refusal = cairn_test::message_of([&] { static_cast<void>(check_scans(log, "log")); });
+    CHECK(refusal.find("log: expected headings in radians") == 0);
+    CHECK(refusal.find("pi / 180") != std::string::npos);
+  }
+
+  TEST_CASE("grid_slam: beams that see more than half a turn are put where scans turn as odometry does") {
+    const grid_slam::Drive drive = grid_slam::simulated_drive({.seed = 3});
+    for (const double degrees : {180, 240, 270, 360}) {
+      CAPTURE(degrees);
+      const double view = degrees * std::numbers::pi / 180;
+      constexpr std::size_t beams = 361;
+      cairn::CarmenLog log = drive.log;
+      for (std::size_t k = 0; k < log.scans.size(); ++k) {
+        std::vector<float>& range = log.scans[k].scan.range;
+        range.clear();
+        for (std::size_t i = 0; i < beams; ++i) {
+          const double angle = view * (static_cast<double>(i) / (beams - 1) - 0.5);
+          const cairn::SE2& at = drive.truth[k];
+          range.push_back(
+              static_cast<float>(grid_slam::range_to_wall(drive.walls, at.x(), at.y(), at.angle() + angle)));
+        }
+        log.scans[k].scan.angle_step = std::numbers::pi / (beams - 1);  // as a line FLASER is read
+      }
+      const std::vector<std::string> notes = check_scans(log, "log");
+      CHECK(notes.size() == (degrees > 180 ? 1 : 0));
+      CHECK(log.scans[0].scan.first_angle == doctest::Approx(-view / 2));
+      CHECK(log.scans[0].scan.angle(beams - 1) == doctest::Approx(view / 2));
+    }
+  }
+
+  TEST_CASE("grid_slam: readings that nothing confirms are left out where there are many, and no others") {
+    cairn::Random random(cairn_test::seed());
+    std::vector<bool> wrong;
+    cairn::CarmenLog log = drive_with([&](float r) {
+      wrong.push_back(random.uniform() < 0.1);
+      return wrong.back() ? static_cast<float>(r * random.uniform(0.1, 1)) : r;
+    });
+    const std::vector<std::string> notes = check_scans(log, "log");
+    REQUIRE(notes.size() == 1);
+    CHECK(notes[0].find("they are left out") != std::string::npos);
+    double spoilt = 0, found = 0, right = 0, lost = 0;
+    std::size_t next = 0;
+    for (const cairn::StampedScan& each : log.scans)
+      for (std::size_t i = 0; i < each.scan.size(); ++i) {
+        const double out = each.scan.kind(i) == BeamKind::invalid ? 1 : 0;
+        (wrong[next] ? spoilt : right) += 1;
+        (wrong[next++] ? found : lost) += out;
+      }
+    CHECK(found > 0.6 * spoilt);  // the others end near a wall
+    CHECK(lost < 0.01 * right);
   }
 }
 

@@ -59,6 +59,10 @@ TEST_SUITE("io/carmen") {
     CHECK(b.scan.size() == 3);
     CHECK(log.odometry[0].time == 9.5);
     CHECK(log.odometry[0].T_odom_robot.y() == 2);
+    // Without a step the field of view says it: 2 rad over three beams.
+    const std::string no_step =
+        "ROBOTLASER1 0 -1 2 0 30 0.01 0 3 1 2 40 0 1 2 0.5 1.1 2.1 0.6 0 0 0 0 0 11.5 host 0.2\n";
+    CHECK(read(no_step).scans[0].scan.angle_step == 1);
   }
 
   TEST_CASE("carmen: DP-SLAM's log is steps of odometry and laser, and its readings end at 8 m") {
@@ -113,6 +117,9 @@ TEST_SUITE("io/carmen") {
           std::string::npos);
     CHECK(words_of("FLASER 0 1 2 3 0 0 0 0 0 0 1 h 0\n").find("log:1: ") != std::string::npos);
     CHECK(words_of("ODOM 0 0 0 0 0 0 1 h 0 9\n").find("log:1: ") != std::string::npos);
+    CHECK(words_of("\x1F\x8B\x08 and so on")
+              .find("expected a CARMEN log, found a file packed by gzip (gunzip") != std::string::npos);
+    CHECK(words_of("BZh91AY&SY").find("bunzip2") != std::string::npos);
     const cairn_test::Folder folder;
     CHECK_FALSE(cairn_test::message_of([&] { static_cast<void>(read_carmen(folder / "none")); }).empty());
   }

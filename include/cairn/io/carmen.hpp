@@ -171,12 +171,14 @@ inline LaserScan described_scan(CarmenFields& fields, double farthest) {
   LaserScan scan;
   fields.number("the type");
   scan.first_angle = fields.number("the first angle");
-  fields.number("the field of view");
+  const double view = fields.number("the field of view");
   scan.angle_step = fields.number("the angle between beams");
   scan.farthest = std::min(farthest, fields.above_zero("the largest range"));
   fields.number("the accuracy");
   fields.number("the mode");
   fields.ranges(scan.range, fields.count("the number of ranges"));
+  // Writers that leave the step out still say what all beams see.
+  if (scan.angle_step == 0 && scan.size() > 1) scan.angle_step = view / static_cast<double>(scan.size() - 1);
   for (std::size_t left = fields.count("the number of remissions"); left > 0; --left)
     fields.number("a remission");
   return scan;

@@ -64,9 +64,10 @@ template <class Number>
 /// without a last line end, and skips a byte-order mark of UTF-8 at the start.
 class TextLines {
 public:
-  /// Reads the whole file; throws Error as read_file does.
+  /// Reads the whole file; throws Error as read_file does, and where it is packed.
   explicit TextLines(const std::filesystem::path& path, std::string_view expected)
       : name_(path.string()), text_(read_file(path, expected)) {
+    expect_unpacked(expected);
     if (std::string_view(text_).substr(0, 3) == "\xEF\xBB\xBF") position_ = 3;
   }
   TextLines(const TextLines&) = delete;  // line() looks into the text held here
@@ -113,6 +114,22 @@ public:
   }
 
 private:
+  void expect_unpacked(std::string_view expected) const {
+    struct Packer {
+      std::string_view begin, name, unpack;
+    };
+    static constexpr Packer packers[] = {{"\x1F\x8B", "gzip", "gunzip"},
+                                         {"BZh", "bzip2", "bunzip2"},
+                                         {"\xFD"
+                                          "7zXZ",
+                                          "xz", "unxz"},
+                                         {"PK\x03\x04", "zip", "unzip"}};
+    for (const Packer& packer : packers)
+      if (text_.starts_with(packer.begin))
+        raise(name_ + ": expected " + std::string(expected) + ", found a file packed by " +
+              std::string(packer.name) + " (" + std::string(packer.unpack) + " makes it text)");
+  }
+
   double finite(std::string_view field, std::size_t index) const {
     const std::optional<double> value = parse_number(field);
     if (!value || !std::isfinite(*value))
