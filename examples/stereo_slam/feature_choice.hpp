@@ -11,7 +11,7 @@
 
 #include <cairn/vision/features.hpp>
 
-#include "riding_along.hpp"
+#include "hidden_cells.hpp"
 
 namespace stereo_slam {
 
