@@ -37,7 +37,10 @@ private:
   std::vector<std::uint8_t> cells_;
 };
 
-/// Of the left and the right image.
-using HiddenParts = std::array<HiddenCells, 2>;
+/// Where points are looked for.
+struct HiddenParts {
+  std::array<HiddenCells, 2> cells;  ///< not here, in the left and the right image
+  bool evenly = false;               ///< all over the images, though other parts have stronger ones
+};
 
 }  // namespace stereo_slam

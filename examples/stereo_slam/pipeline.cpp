@@ -521,21 +521,24 @@ void Pipeline::leave_out_what_rides_along(cairn::StereoPose& pose, std::vector<M
   }
 }
 
-/// What rides along and is noticed in the first frames was taken for the world until then, by the rig's
-/// calibration as well: they are looked at anew without it, from where the map began. False where that is not
-/// so.
+/// What rides along and is noticed or suspected in the first frames was taken for the world until then, by
+/// the rig's calibration as well: they are looked at anew with what is known now, from where the map began.
+/// False where that is not so.
 bool Pipeline::begin_again() {
   constexpr std::size_t longest = 12;  // frames
   if (!may_begin_again_) return false;
-  const bool noticed = left_alone() != nullptr;
+  const RidingAlong::Sureness sureness = riding_along_->sureness();
+  const bool noticed = sureness > began_with_;
   may_begin_again_ = !noticed && beginning_.size() < longest;
   const std::vector<StereoFrame> frames =
       may_begin_again_ ? std::vector<StereoFrame>() : std::exchange(beginning_, {});
   if (!noticed) return false;
   Pipeline again(given_, options_);
-  again.may_begin_again_ = false;
+  again.may_begin_again_ = sureness == RidingAlong::suspected;
+  again.began_with_ = sureness;
   again.riding_along_ = std::move(riding_along_);
-  again.record_.notes.push_back(record_.notes.back());
+  again.riding_along_->begin_again();
+  if (sureness == RidingAlong::known) again.record_.notes.push_back(record_.notes.back());
   std::vector<double> loading;
   for (const FrameRecord& frame : record_.frames)
     loading.push_back(frame.milliseconds[static_cast<std::size_t>(Stage::load)]);

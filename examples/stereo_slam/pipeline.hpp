@@ -258,6 +258,7 @@ private:
   std::vector<LocalLandmark> locals_;
   std::optional<RidingAlong> riding_along_;  // from the first frame on
   bool may_begin_again_ = true;
+  RidingAlong::Sureness began_with_ = RidingAlong::unsuspected;
   std::vector<StereoFrame> beginning_;   // the first frames, while the map may begin again
   std::vector<std::uint32_t> left_out_;  // locals of this frame that stood still against its motion
   cairn::SE3 T_world_camera_;

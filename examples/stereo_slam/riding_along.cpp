@@ -12,6 +12,8 @@ namespace stereo_slam {
 namespace {
 
 using Pixels = std::vector<cairn::Vector<2>>;
+constexpr int doubtful_frames = 8;  // after the last frame that was in doubt
+
 using Indices = std::vector<std::size_t>;
 
 /// How far a point may wander that stands still: what shakes by half a pixel, and the noise of its keypoint.
@@ -46,6 +48,20 @@ double reach_of(const Indices& some, const MatchesOfFrame& seen, const Counts& c
   for (const std::size_t i : some)
     if (counts(i)) pixels.push_back(seen.matches[i].left);
   return pixels.empty() ? 0 : reach(pixels);
+}
+
+/// What a reach counts beside another's: more, where the one's points are farther, since what is nearer
+/// covers the rest. By disparities, which in rigs whose cameras look one way fall with the depth.
+double weight_of(const Indices& some, const Indices& others, const MatchesOfFrame& seen) {
+  constexpr double most = 4;  // a vehicle far ahead is a part of no world
+  const auto nearness = [&](const Indices& of) {
+    std::vector<double> disparities;
+    for (const std::size_t i : of)
+      disparities.push_back((seen.matches[i].left - seen.matches[i].right).norm());
+    return disparities.empty() ? 0 : cairn::median(std::move(disparities));
+  };
+  const double one = nearness(some), other = nearness(others);
+  return one > 0 && other > 0 ? std::clamp(other / one, 1 / most, most) : 1;
 }
 
 /// The motion of some of the matches, where enough agree on one; its inliers are of all matches.
@@ -88,34 +104,48 @@ RidingAlong::Decision RidingAlong::decide(cairn::StereoPose pose, const cairn::P
 
 /// The other motion, where it reaches farther over the image: that of those that moved, where most that agree
 /// on `pose`, or all that could, stand still; otherwise that of those that stand still, where it reaches
-/// twice as far and nothing is known to ride along.
+/// twice as far and nothing is known to ride along, or half as far where that was the rig's motion against
+/// others before.
 RidingAlong::Decision RidingAlong::weigh(cairn::StereoPose pose, const cairn::PinholeCamera& left,
-                                         const MatchesOfFrame& seen, const Estimate& estimate) const {
+                                         const MatchesOfFrame& seen, const Estimate& estimate) {
   Indices still, moved;
   std::size_t still_agree = 0, moved_agree = 0;
   const auto agrees = [&](std::size_t i) { return pose.good() && pose.inliers[i] != 0; };
-  const auto unsuspected = [&](std::size_t i) { return !cells_[0].suspects(seen.matches[i].left); };
+  const auto all = [](std::size_t) { return true; };
+  const auto trusted = [&](std::size_t i) { return !cells_[0].suspects(seen.matches[i].left); };
   for (std::size_t i = 0; i < seen.matches.size(); ++i) {
     const bool stands = stands_still(seen, i);
     (stands ? still : moved).push_back(i);
     (stands ? still_agree : moved_agree) += agrees(i) ? 1 : 0;
   }
   const bool stood = !pose.good() || still_agree > moved_agree;
-  if (stood && moved.size() - moved_agree >= options_.fewest_sure && still.size() >= options_.fewest) {
-    if (auto other = motion_of(moved, seen, estimate, options_.fewest_sure)) {
+  const bool stood_before = std::exchange(stands_against_others_, false);
+  doubtful_ = std::max(0, doubtful_ - 1);
+  if (stood && moved.size() - moved_agree >= options_.fewest && still.size() >= options_.fewest) {
+    if (auto other = motion_of(moved, seen, estimate, options_.fewest)) {
       Indices against = still_against(other->T_world_camera, left, seen);
-      const double farther = reach_of(moved, seen, [&](std::size_t i) { return other->inliers[i] != 0; });
-      if (farther >= reach_of(against, seen, unsuspected)) return {std::move(*other), std::move(against)};
+      std::erase_if(moved, [&](std::size_t i) { return other->inliers[i] == 0; });
+      const double farther = weight_of(moved, against, seen) * reach_of(moved, seen, all);
+      const double reached = reach_of(against, seen, trusted);
+      if (moved.size() >= options_.fewest_sure && farther >= reached)
+        return {std::move(*other), std::move(against)};
+      if (against.size() >= options_.fewest) doubtful_ = doubtful_frames;
+      stands_against_others_ = reached >= 2 * farther;
     }
   }
   if (!pose.good()) return {std::move(pose), {}};
   Indices against = still_against(pose.T_world_camera, left, seen);
-  if (!stood && against.size() >= options_.fewest_sure && cells_[0].hidden().count() == 0 &&
-      reach_of(against, seen, unsuspected) >= 2 * reach_of(moved, seen, agrees))
-    if (auto other = motion_of(against, seen, estimate, options_.fewest_sure)) {
-      against = still_against(other->T_world_camera, left, seen);
-      return {std::move(*other), std::move(against)};
-    }
+  if (!stood && against.size() >= options_.fewest && cells_[0].hidden().count() == 0) {
+    const double farther = weight_of(against, moved, seen) * reach_of(against, seen, trusted);
+    const double reached = reach_of(moved, seen, agrees);
+    if (against.size() >= options_.fewest_sure && farther >= (stood_before ? 0.5 : 2) * reached)
+      if (auto other = motion_of(against, seen, estimate, options_.fewest_sure)) {
+        stands_against_others_ = true;
+        against = still_against(other->T_world_camera, left, seen);
+        return {std::move(*other), std::move(against)};
+      }
+    if (farther >= reached) doubtful_ = doubtful_frames;
+  }
   return {std::move(pose), std::move(against)};
 }
 
@@ -135,14 +165,19 @@ void RidingAlong::judge(const Decision& decision, const MatchesOfFrame& seen) {
 std::optional<std::string> RidingAlong::close_frame(std::size_t index) {
   const HiddenCells &left = cells_[0].hidden(), &right = cells_[1].hidden();
   const std::size_t count = left.count() + right.count();
-  const std::size_t before = left_alone_ ? (*left_alone_)[0].count() + (*left_alone_)[1].count() : 0;
-  if (count == 0 && before == 0) return std::nullopt;
-  const std::size_t unlike =
-      left_alone_ ? left.unlike((*left_alone_)[0]) + right.unlike((*left_alone_)[1]) : count;
-  if (count == 0)
+  if (count == 0 && doubtful_ == 0) {
     left_alone_.reset();
-  else if (8 * unlike > before)
-    left_alone_ = std::make_shared<const HiddenParts>(HiddenParts{left, right});
+  } else if (count == 0) {
+    if (!left_alone_ || !left_alone_->evenly)
+      left_alone_ = std::make_shared<const HiddenParts>(HiddenParts{{left, right}, true});
+  } else {
+    const auto unlike = [&](const HiddenParts& other) {
+      return left.unlike(other.cells[0]) + right.unlike(other.cells[1]);
+    };
+    if (!left_alone_ ||
+        8 * unlike(*left_alone_) > left_alone_->cells[0].count() + left_alone_->cells[1].count())
+      left_alone_ = std::make_shared<const HiddenParts>(HiddenParts{{left, right}, false});
+  }
   record_.share = cells_[0].share();
   record_.largest_share = std::max(record_.largest_share, record_.share);
   if (record_.since || !(record_.share > 0)) return std::nullopt;

@@ -13,8 +13,13 @@
 /// of the image: textured dirt had 1230 of 1340 matches of a drive, in three times as many cells as the
 /// rest.) A lorry that passes a rig that stands reaches less far than the street behind it.
 ///
+/// What is nearer covers the rest: a reach counts as many times as its points are farther. And where those
+/// that moved agree, but are too few or reach too little to say so, the strongest points of the images may be
+/// of what rides along: for some frames they are looked for all over the images.
+///
 /// A decision stands as long as the rest agrees on a motion: what a frame's motion was told by is suspected
-/// in the next, however far it reaches. Which cells are left out for it is riding_cells.hpp's to say.
+/// in the next, however far it reaches, and a rig that stood while others moved stands until these clearly
+/// reach farther. Which cells are left out for it is riding_cells.hpp's to say.
 #pragma once
 
 #include <array>
@@ -75,6 +80,12 @@ public:
     std::vector<std::size_t>
         riding;  ///< matches that stand still against it, ascending: no part of the world
   };
+  /// Whether something rides along.
+  enum Sureness { unsuspected, suspected, known };
+  [[nodiscard]] Sureness sureness() const noexcept {
+    return !left_alone_ ? unsuspected : left_alone_->evenly ? suspected : known;
+  }
+
   /// Pose of some of the matches, as the first one was estimated.
   using Estimate = std::function<cairn::StereoPose(std::span<const cairn::StereoMatch>)>;
   /// Which of two motions that matches agree on is the rig's: `pose` (good or not, of all matches), or that
@@ -86,18 +97,23 @@ public:
   /// After a frame, whose number that is: a sentence for the notes where it is the first to say so.
   [[nodiscard]] std::optional<std::string> close_frame(std::size_t index);
 
-  /// Where the next frames need no points; nullptr where nothing rides along. It is not another one for every
-  /// cell: frames that are under way are looked at once more then.
+  /// The frames are looked at anew from the first; the cells keep what they have learnt.
+  void begin_again() noexcept { stands_against_others_ = false; }
+
+  /// Where the next frames need points; nullptr where that is not known better. It is not another one for
+  /// every cell: frames that are under way are looked at once more then.
   [[nodiscard]] const std::shared_ptr<const HiddenParts>& left_alone() const noexcept { return left_alone_; }
   [[nodiscard]] const RidingAlongRecord& record() const noexcept { return record_; }
 
 private:
   [[nodiscard]] Decision weigh(cairn::StereoPose pose, const cairn::PinholeCamera& left,
-                               const MatchesOfFrame& seen, const Estimate& estimate) const;
+                               const MatchesOfFrame& seen, const Estimate& estimate);
   void judge(const Decision& decision, const MatchesOfFrame& seen);
 
   RidingAlongOptions options_;
-  std::array<RidingCells, 2> cells_;  // of the left and the right image
+  std::array<RidingCells, 2> cells_;    // of the left and the right image
+  bool stands_against_others_ = false;  // by the frame before: the rig, though others moved
+  int doubtful_ = 0;                    // frames for which points are still to be looked for everywhere
   std::shared_ptr<const HiddenParts> left_alone_;
   RidingAlongRecord record_;
 };

@@ -48,12 +48,13 @@ public:
     return add(count, box, nearest, farthest, T_world_camera_);
   }
   /// Points that ride along.
-  std::vector<std::size_t> carry(std::size_t count, const Box& box) {
-    return add(count, box, 6, 7, cairn::SE3());
+  std::vector<std::size_t> carry(std::size_t count, const Box& box, double nearest = 6, double farthest = 7) {
+    return add(count, box, nearest, farthest, cairn::SE3());
   }
   /// Points of a body that has moved as though the rig had moved so.
-  std::vector<std::size_t> pass(std::size_t count, const Box& box, const cairn::SE3& as_though) {
-    return add(count, box, 6, 7, as_though);
+  std::vector<std::size_t> pass(std::size_t count, const Box& box, const cairn::SE3& as_though,
+                                double nearest = 6, double farthest = 7) {
+    return add(count, box, nearest, farthest, as_though);
   }
   /// What a map that was loaded does not know.
   void forget_first() {
@@ -158,7 +159,7 @@ TEST_SUITE("riding along") {
         CHECK(decision.riding.empty());
         CHECK_FALSE(what.close_frame(static_cast<std::size_t>(i)));
       }
-      CHECK_FALSE(what.left_alone());
+      CHECK(what.sureness() != RidingAlong::known);
       CHECK(what.record().largest_share == 0);
     }
   }
@@ -178,7 +179,7 @@ TEST_SUITE("riding along") {
       "riding along: what a motion was told by is suspected in the next frame, however far it reaches") {
     const auto next = [](RidingAlong& what) {
       Frame frame(ahead(2), 5);
-      frame.see(60, {200, 5, 440, 100}, 15);
+      frame.see(60, {200, 5, 440, 100}, 6, 7);
       frame.carry(300, {60, 160, 620, 235});
       return frame.is_here(frame.decide(what).pose.T_world_camera);
     };
@@ -210,6 +211,79 @@ TEST_SUITE("riding along") {
       static_cast<void>(frame.decide(what));
     }
     CHECK(next(what));
+  }
+
+  TEST_CASE(
+      "riding along: of two motions that reach about as far the one that is nearer is no part of the world") {
+    // The same halves of the image: what stands there is a near body, or a street beside a near lorry.
+    const Box left_half{80, 5, 340, 235};
+    const cairn::SE3 sideways(cairn::SO3(), {0.4, 0, 0});
+    {
+      RidingAlong what = nothing_known();
+      Frame frame(sideways, 21);
+      const auto body = frame.carry(300, left_half, 3, 3.5);
+      frame.see(80, {360, 40, 600, 200}, 15);
+      const RidingAlong::Decision decision = frame.decide(what);
+      CHECK(frame.is_here(decision.pose.T_world_camera));
+      CHECK(decision.riding == body);
+    }
+    {
+      RidingAlong what = nothing_known();
+      Frame frame(cairn::SE3(), 22);
+      frame.see(80, {360, 40, 600, 200}, 15);
+      frame.pass(300, left_half, sideways, 3, 3.5);
+      const RidingAlong::Decision decision = frame.decide(what);
+      CHECK(frame.is_here(decision.pose.T_world_camera));
+      CHECK(decision.riding.empty());
+    }
+  }
+
+  TEST_CASE(
+      "riding along: a rig that stood while something moved stands on, where that covers most of the image") {
+    const auto covered = [](RidingAlong& what) {
+      Frame frame(cairn::SE3(), 31);
+      frame.see(100, {400, 40, 620, 200}, 8, 12);
+      frame.pass(400, {40, 5, 390, 235}, cairn::SE3(cairn::SO3(), {0.4, 0, 0}));
+      return frame.is_here(frame.decide(what).pose.T_world_camera);
+    };
+    RidingAlong unknowing = nothing_known();
+    REQUIRE_FALSE(covered(unknowing));
+    RidingAlong what = nothing_known();
+    Frame frame(cairn::SE3(), 30);
+    frame.see(200, whole, 8, 12);
+    frame.pass(100, {40, 40, 120, 200}, cairn::SE3(cairn::SO3(), {0.4, 0, 0}));
+    REQUIRE(frame.is_here(frame.decide(what).pose.T_world_camera));
+    CHECK(covered(what));
+  }
+
+  TEST_CASE(
+      "riding along: where too few moved to say so points are looked for everywhere, for eight frames more") {
+    RidingAlong what = nothing_known();
+    CHECK(what.sureness() == RidingAlong::unsuspected);
+    Frame frame(ahead(1), 41);
+    frame.see(18, whole);
+    frame.carry(300, {60, 160, 620, 235});
+    CHECK_FALSE(frame.is_here(frame.decide(what).pose.T_world_camera));
+    CHECK_FALSE(what.close_frame(0));
+    REQUIRE(what.sureness() == RidingAlong::suspected);
+    CHECK(what.left_alone()->evenly);
+    const auto everywhere = what.left_alone();
+    for (std::size_t i = 1; i <= 8; ++i) {
+      CHECK(what.left_alone() == everywhere);
+      Frame quiet(cairn::SE3(), i);
+      quiet.see(100, whole);
+      static_cast<void>(quiet.decide(what));
+      CHECK_FALSE(what.close_frame(i));
+    }
+    CHECK(what.sureness() == RidingAlong::unsuspected);
+    for (std::size_t i = 1; i <= 3; ++i) {
+      Frame clear(ahead(1), 50 + i);
+      clear.see(150, whole);
+      clear.carry(300, {200, 160, 440, 235});
+      static_cast<void>(clear.decide(what));
+      static_cast<void>(what.close_frame(8 + i));
+    }
+    CHECK(what.sureness() == RidingAlong::known);
   }
 
   TEST_CASE("riding along: far points that stand still because they are far are part of the world") {
