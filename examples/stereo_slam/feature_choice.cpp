@@ -75,6 +75,10 @@ Extractor make_extractor(const FeatureOptions& options, HiddenCells hidden) {
     surf.upright = !options.oriented;
     surf.target_count = options.points;
     surf.threshold = options.surf_threshold;
+    if (options.evenly) {
+      surf.grid_columns = 12;
+      surf.grid_rows = 8;
+    }
     if (hidden.count() > 0) return shared(SurfBeside(surf, options.threads, std::move(hidden)));
     return shared(cairn::Surf(surf, options.threads));
   }

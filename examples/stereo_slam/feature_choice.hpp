@@ -11,7 +11,7 @@
 
 #include <cairn/vision/features.hpp>
 
-#include "riding_along.hpp"
+#include "hidden_cells.hpp"
 
 namespace stereo_slam {
 
@@ -31,6 +31,7 @@ struct FeatureOptions {
   int points = 2000;             ///< kept in an image
   float surf_threshold = 10.0F;  ///< least response of SURF [(grey levels)^2]
   bool oriented = false;         ///< SURF with orientation; the others always have one
+  bool evenly = false;           ///< SURF all over the image, not where the strongest are
   unsigned threads = 1;          ///< of SURF; the points do not depend on it
 };
 

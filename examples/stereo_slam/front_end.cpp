@@ -27,8 +27,9 @@ FrontEnd::FrontEnd(const FeatureOptions& features, unsigned threads)
       right_(make_extractor(features_)) {}
 
 void FrontEnd::make_extractors() {
-  left_ = make_extractor(features_, left_alone_ ? (*left_alone_)[0] : HiddenCells());
-  right_ = make_extractor(features_, left_alone_ ? (*left_alone_)[1] : HiddenCells());
+  features_.evenly = left_alone_ && left_alone_->evenly;
+  left_ = make_extractor(features_, left_alone_ ? left_alone_->cells[0] : HiddenCells());
+  right_ = make_extractor(features_, left_alone_ ? left_alone_->cells[1] : HiddenCells());
 }
 
 void FrontEnd::keep(int points) {

@@ -16,7 +16,7 @@
 
 #include "dataset.hpp"
 #include "feature_choice.hpp"
-#include "riding_along.hpp"
+#include "hidden_cells.hpp"
 #include "stereo_matcher.hpp"
 
 namespace stereo_slam {

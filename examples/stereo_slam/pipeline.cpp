@@ -49,13 +49,6 @@ cairn::KeyframeMapOptions map_options(const PipelineOptions& options) {
   return map;
 }
 
-using Pixels = std::vector<cairn::Vector<2>>;
-
-/// How far a point may wander that stands still: what shakes by half a pixel, and the noise of its keypoint.
-double stillness(double sigma) {
-  return 1 + 3 * sigma;
-}
-
 /// What may be why a frame shows next to nothing, in brackets; empty where nothing strikes.
 std::string oddity_of(const cairn::StereoRig& rig, const StereoFrame& frame) {
   const cairn::PinholeParameters& camera = rig.left.parameters();
@@ -159,13 +152,13 @@ const FrameRecord& Pipeline::step_by_own_points(const StereoFrame& frame, int wa
                                                 double load_milliseconds) {
   if (!front_end_) front_end_.emplace(feature_options(options_), options_.threads);
   front_end_->keep(wanted);
-  front_end_->leave_alone(left_alone_);
+  front_end_->leave_alone(left_alone());
   return step(frame, (*front_end_)(frame, match_stereo_), load_milliseconds);
 }
 
 const FrameRecord& Pipeline::step(const StereoFrame& frame, const FramePoints& points,
                                   double load_milliseconds) {
-  if (points.left_alone != left_alone_)  // they were found before this was known
+  if (points.left_alone != left_alone())  // they were found before this was known
     return step_by_own_points(frame, points.wanted > 0 ? points.wanted : budget_.points(), load_milliseconds);
   FrameRecord& result = record_.frames.emplace_back();
   const auto of = [&](Stage stage) -> double& {
@@ -223,9 +216,9 @@ void Pipeline::work_on(const StereoFrame& frame, const FramePoints& points, Fram
   left_ = &points.left;
   image_ = frame.left;
   timed(result, Stage::total, [&] {
-    if (riding_along_.empty())
-      for (const cairn::Image* image : {&frame.left, &frame.right})
-        riding_along_.emplace_back(image->width(), image->height());
+    if (!riding_along_)
+      riding_along_.emplace(frame.left, frame.right,
+                            RidingAlongOptions{options_.min_inliers, options_.relocating_inliers});
     const std::optional<std::string> torn = of_two_moments(frame);
     timed(result, Stage::stereo, [&] {
       std::vector<PointPair> pairs =
@@ -246,7 +239,7 @@ void Pipeline::work_on(const StereoFrame& frame, const FramePoints& points, Fram
     else
       follow(frame, result);
   });
-  note_what_rides_along();
+  if (const auto note = riding_along_->close_frame(result.index)) record_.notes.push_back(*note);
   if (frame.truth && (T_truth_world_ || !lost_)) {
     if (!T_truth_world_) T_truth_world_ = *frame.truth * T_world_camera_.inverse();
     result.truth = T_truth_world_->inverse() * *frame.truth;
@@ -430,12 +423,9 @@ std::vector<PointPair> Pipeline::pairs_of(const StereoFrame& frame, const FrameP
 void Pipeline::find_local_landmarks(const FramePoints& points, std::span<const PointPair> pairs) {
   locals_.clear();
   left_out_.clear();
-  riding_along_[0].watch(points.left);
-  riding_along_[1].watch(points.right);
+  riding_along_->watch(points.left, points.right);
   for (const PointPair& pair : pairs) {
-    if (riding_along_[0].hidden().hides(pair.left_pixel(0), pair.left_pixel(1)) ||
-        riding_along_[1].hidden().hides(pair.right_pixel(0), pair.right_pixel(1)))
-      continue;
+    if (riding_along_->hides(pair.left_pixel, pair.right_pixel)) continue;
     const double scale = left_->keypoints[pair.left].scale;
     const double sigma = options_.pixel_sigma * std::pow(scale, options_.scale_exponent);
     const cairn::Triangulation seen = triangulate_(pair.left_pixel, pair.right_pixel, sigma, sigma);
@@ -479,19 +469,20 @@ std::vector<Pipeline::Match> Pipeline::match_with_map() const {
 /// RANSAC over the matches, a second look for landmarks that the pose says must be in view, and the last word
 /// to the joint covariance of the keyframes that all of them rest on.
 std::optional<Pipeline::Located> Pipeline::locate(std::vector<Match>& matches) {
-  const auto estimate = [&](std::vector<Match>& from) {
-    return cairn::estimate_stereo_pose(rig_, observations(from), pose_options(), prediction());
+  const auto estimate = [&](std::span<const cairn::StereoMatch> seen) {
+    return cairn::estimate_stereo_pose(rig_, seen, pose_options(), prediction());
   };
   std::vector<Match> near = within_reach(matches);
-  cairn::StereoPose pose = estimate(near);
+  std::vector<cairn::StereoMatch> seen = observations(near);
+  cairn::StereoPose pose = estimate(seen);
   if (!pose.good() && near.size() < matches.size()) {
     near = matches;
-    pose = estimate(near);
+    seen = observations(near);
+    pose = estimate(seen);
   }
   matches = std::move(near);
-  if (auto other = farther_reaching(pose, matches)) pose = std::move(*other);
+  leave_out_what_rides_along(pose, matches, seen, estimate);
   if (!pose.good()) return std::nullopt;
-  leave_out_what_rides_along(pose, matches);
   expected_.clear();
   if_time(Shed::second_look, [&] { look_again(pose, matches); });
   Located located;
@@ -508,150 +499,46 @@ std::optional<Pipeline::Located> Pipeline::locate(std::vector<Match>& matches) {
   return located;
 }
 
-/// Whether both images show a match's landmark where they showed it first.
-bool Pipeline::stands_still(const Match& match) const {
-  const LocalLandmark& local = locals_[match.local];
-  const cairn::Vector<4> before = landmarks_[match.landmark].first_pixels.cast<double>();
-  cairn::Vector<4> now;
-  now << local.left_pixel, local.right_pixel - local.moved;
-  return (now - before).cwiseAbs().maxCoeff() < stillness(local.sigma);
-}
-
-/// Of the matches those that stand still though the camera, were it there, would see them elsewhere than at
-/// first, by more than twice what stillness allows.
-std::vector<std::size_t> Pipeline::still_against(const cairn::SE3& T_world_camera,
-                                                 std::span<const Match> matches) {
-  std::vector<std::size_t> result;
-  const cairn::SE3 T_camera_world = T_world_camera.inverse();
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    if (!stands_still(matches[i])) continue;
-    const auto landmark = map_.landmark(matches[i].landmark);
-    if (!landmark) continue;
-    const auto due = rig_.left.project(T_camera_world * landmark->mean);
-    const cairn::Vector<2> first = landmarks_[matches[i].landmark].first_pixels.head<2>().cast<double>();
-    if (!due || (*due - first).norm() > 2 * stillness(locals_[matches[i].local].sigma)) result.push_back(i);
+/// Makes `pose` the rig's where it is that of what rides along, and takes the matches with that out.
+void Pipeline::leave_out_what_rides_along(cairn::StereoPose& pose, std::vector<Match>& matches,
+                                          std::span<const cairn::StereoMatch> seen,
+                                          const RidingAlong::Estimate& estimate) {
+  std::vector<Apparent> apparent;
+  apparent.reserve(matches.size());
+  for (const Match& match : matches) {
+    const LocalLandmark& local = locals_[match.local];
+    Apparent& one = apparent.emplace_back();
+    one.first = landmarks_[match.landmark].first_pixels.cast<double>();
+    one.now << local.pair.left_pixel, local.pair.right_pixel;
   }
-  return result;
-}
-
-/// The other of two motions that matches agree on, where it reaches farther over the image
-/// (riding_along.hpp): that of those that moved, where most that agree on `pose`, or all that could, stand
-/// still; otherwise that of those that stand still, where it reaches twice as far and nothing is known to
-/// ride along.
-std::optional<cairn::StereoPose> Pipeline::farther_reaching(const cairn::StereoPose& pose,
-                                                            const std::vector<Match>& matches) {
-  std::vector<std::size_t> still, moved;
-  std::size_t still_agree = 0, moved_agree = 0;
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    const bool agrees = pose.good() && pose.inliers[i] != 0;
-    const bool stands = stands_still(matches[i]);
-    (stands ? still : moved).push_back(i);
-    (stands ? still_agree : moved_agree) += agrees ? 1 : 0;
-  }
-  const bool stood = !pose.good() || still_agree > moved_agree;
-  const auto reaches = [&](const std::vector<std::size_t>& some, const auto& counts) {
-    Pixels pixels;
-    for (const std::size_t i : some)
-      if (counts(i)) pixels.push_back(locals_[matches[i].local].left_pixel);
-    return pixels.empty() ? 0 : reach(pixels);
-  };
-  const auto unsuspected = [&](std::size_t i) {
-    return !riding_along_[0].suspects(locals_[matches[i].local].left_pixel);
-  };
-  const auto agreed_by = [&](std::vector<std::size_t> some) -> std::optional<cairn::StereoPose> {
-    std::vector<Match> part;
-    for (const std::size_t i : some) part.push_back(matches[i]);
-    cairn::StereoPose result =
-        cairn::estimate_stereo_pose(rig_, observations(part), pose_options(), prediction());
-    if (!result.good() || result.inlier_count < options_.relocating_inliers) return std::nullopt;
-    std::vector<std::uint8_t> inliers(matches.size(), 0);
-    for (std::size_t k = 0; k < some.size(); ++k) inliers[some[k]] = result.inliers[k];
-    result.inliers = std::move(inliers);
-    return result;
-  };
-  if (stood) {
-    if (moved.size() - moved_agree < options_.relocating_inliers || still.size() < options_.min_inliers)
-      return std::nullopt;
-    auto other = agreed_by(moved);
-    if (!other) return std::nullopt;
-    const double farther = reaches(moved, [&](std::size_t i) { return other->inliers[i] != 0; });
-    if (farther < reaches(still_against(other->T_world_camera, matches), unsuspected)) return std::nullopt;
-    return other;
-  }
-  const std::vector<std::size_t> against = still_against(pose.T_world_camera, matches);
-  const double moved_reach = reaches(moved, [&](std::size_t i) { return pose.inliers[i] != 0; });
-  if (against.size() < options_.relocating_inliers || riding_along_[0].hidden().count() > 0 ||
-      reaches(against, unsuspected) < 2 * moved_reach)
-    return std::nullopt;
-  return agreed_by(against);
-}
-
-/// Takes the matches out of which enough stand still against the motion; where they do so for several frames
-/// that part of the image is no longer looked at.
-void Pipeline::leave_out_what_rides_along(cairn::StereoPose& pose, std::vector<Match>& matches) {
-  const std::vector<std::size_t> against = still_against(pose.T_world_camera, matches);
-  if (against.size() < options_.min_inliers) return;
-  std::array<Pixels, 2> still, moved;
-  const auto add = [&](std::array<Pixels, 2>& to, std::size_t match) {
-    to[0].push_back(locals_[matches[match].local].pair.left_pixel);
-    to[1].push_back(locals_[matches[match].local].pair.right_pixel);
-  };
-  for (const std::size_t i : against) {
-    left_out_.push_back(matches[i].local);
-    add(still, i);
-  }
-  for (std::size_t i = 0; i < matches.size(); ++i)
-    if (pose.inliers[i] != 0 && !stands_still(matches[i])) add(moved, i);
-  for (auto i = against.rbegin(); i != against.rend(); ++i) {
+  RidingAlong::Decision decision =
+      riding_along_->decide(std::move(pose), rig_.left, {seen, apparent}, estimate);
+  pose = std::move(decision.pose);
+  for (const std::size_t i : decision.riding) left_out_.push_back(matches[i].local);
+  for (auto i = decision.riding.rbegin(); i != decision.riding.rend(); ++i) {
     matches.erase(matches.begin() + static_cast<std::ptrdiff_t>(*i));
     pose.inliers.erase(pose.inliers.begin() + static_cast<std::ptrdiff_t>(*i));
   }
-  for (const std::size_t side : {std::size_t{0}, std::size_t{1}})
-    riding_along_[side].judge(still[side], moved[side]);
 }
 
-/// For the record, and for those who look for the points of the next frames. These are not bothered with
-/// every cell: frames that are under way are looked at once more then.
-void Pipeline::note_what_rides_along() {
-  const std::size_t count = riding_along_[0].hidden().count() + riding_along_[1].hidden().count();
-  const std::size_t before = left_alone_ ? (*left_alone_)[0].count() + (*left_alone_)[1].count() : 0;
-  if (count == 0 && before == 0) return;
-  const HiddenParts now{riding_along_[0].hidden(), riding_along_[1].hidden()};
-  const std::size_t unlike =
-      left_alone_ ? now[0].unlike((*left_alone_)[0]) + now[1].unlike((*left_alone_)[1]) : count;
-  if (count == 0)
-    left_alone_.reset();
-  else if (8 * unlike > before)
-    left_alone_ = std::make_shared<const HiddenParts>(now);
-  RidingAlongRecord& record = record_.riding_along;
-  record.share = riding_along_[0].share();
-  record.largest_share = std::max(record.largest_share, record.share);
-  if (record.since || !(record.share > 0)) return;
-  const std::size_t index = record_.frames.back().index;
-  record.since = index;
-  record_.notes.push_back(
-      "from frame " + std::to_string(index) +
-      " on a part of the image is left out: what is seen there stands still while the "
-      "camera moves, as its own vehicle or mount, dirt on the lenses, or what drives ahead");
-}
-
-/// What rides along and is noticed in the first frames was taken for the world until then, by the rig's
-/// calibration as well: they are looked at anew without it, from where the map began. False where that is not
-/// so.
+/// What rides along and is noticed or suspected in the first frames was taken for the world until then, by
+/// the rig's calibration as well: they are looked at anew with what is known now, from where the map began.
+/// False where that is not so.
 bool Pipeline::begin_again() {
   constexpr std::size_t longest = 12;  // frames
   if (!may_begin_again_) return false;
-  const bool noticed = left_alone_ != nullptr;
+  const RidingAlong::Sureness sureness = riding_along_->sureness();
+  const bool noticed = sureness > began_with_;
   may_begin_again_ = !noticed && beginning_.size() < longest;
   const std::vector<StereoFrame> frames =
       may_begin_again_ ? std::vector<StereoFrame>() : std::exchange(beginning_, {});
   if (!noticed) return false;
   Pipeline again(given_, options_);
-  again.may_begin_again_ = false;
+  again.may_begin_again_ = sureness == RidingAlong::suspected;
+  again.began_with_ = sureness;
   again.riding_along_ = std::move(riding_along_);
-  again.left_alone_ = std::move(left_alone_);
-  again.record_.riding_along = record_.riding_along;
-  again.record_.notes.push_back(record_.notes.back());
+  again.riding_along_->begin_again();
+  if (sureness == RidingAlong::known) again.record_.notes.push_back(record_.notes.back());
   std::vector<double> loading;
   for (const FrameRecord& frame : record_.frames)
     loading.push_back(frame.milliseconds[static_cast<std::size_t>(Stage::load)]);
@@ -1077,6 +964,7 @@ std::vector<cairn::SE3> Pipeline::corrected_path(const std::vector<FrameRecord>&
 
 RunRecord Pipeline::record() {
   RunRecord record = record_;
+  if (riding_along_) record.riding_along = riding_along_->record();
   record.variance_factor = noise_factors_.poses();
   record.rig = rig_;
   lay_lost_frames(record.frames, options_.motion.process);

@@ -135,7 +135,9 @@ public:
   [[nodiscard]] std::shared_ptr<const StereoMatcher> settled_matcher() const;
 
   /// Where the next frames need no points: what rides along. nullptr where nothing does.
-  [[nodiscard]] std::shared_ptr<const HiddenParts> left_alone() const { return left_alone_; }
+  [[nodiscard]] std::shared_ptr<const HiddenParts> left_alone() const {
+    return riding_along_ ? riding_along_->left_alone() : nullptr;
+  }
 
   /// Points that an image of the next frames should have, to keep within the budget.
   [[nodiscard]] int wanted_points() const noexcept { return budget_.points(); }
@@ -211,13 +213,9 @@ private:
   [[nodiscard]] Places settle(const cairn::SE3& T_world_camera, std::span<const Match> matches,
                               std::span<cairn::StereoSighting> sightings);
   const FrameRecord& step_by_own_points(const StereoFrame& frame, int wanted, double load_milliseconds);
-  [[nodiscard]] bool stands_still(const Match& match) const;
-  [[nodiscard]] std::vector<std::size_t> still_against(const cairn::SE3& T_world_camera,
-                                                       std::span<const Match> matches);
-  [[nodiscard]] std::optional<cairn::StereoPose> farther_reaching(const cairn::StereoPose& pose,
-                                                                  const std::vector<Match>& matches);
-  void leave_out_what_rides_along(cairn::StereoPose& pose, std::vector<Match>& matches);
-  void note_what_rides_along();
+  void leave_out_what_rides_along(cairn::StereoPose& pose, std::vector<Match>& matches,
+                                  std::span<const cairn::StereoMatch> seen,
+                                  const RidingAlong::Estimate& estimate);
   bool begin_again();
   [[nodiscard]] std::vector<std::uint8_t> spoken_for(std::span<const Match> matches) const;
   void look_again(const cairn::StereoPose& pose, std::vector<Match>& matches);
@@ -258,11 +256,11 @@ private:
   bool lost_ = false;                       // where the camera is is not known from the frame before
   double best_share_ = 0;                   // of a frame's points that the map knew, since the last keyframe
   std::vector<LocalLandmark> locals_;
-  std::vector<RidingAlong> riding_along_;  // of the left and the right image, from the first frame on
+  std::optional<RidingAlong> riding_along_;  // from the first frame on
   bool may_begin_again_ = true;
-  std::vector<StereoFrame> beginning_;             // the first frames, while the map may begin again
-  std::shared_ptr<const HiddenParts> left_alone_;  // what points are no longer looked for in
-  std::vector<std::uint32_t> left_out_;            // locals of this frame that stood still against its motion
+  RidingAlong::Sureness began_with_ = RidingAlong::unsuspected;
+  std::vector<StereoFrame> beginning_;   // the first frames, while the map may begin again
+  std::vector<std::uint32_t> left_out_;  // locals of this frame that stood still against its motion
   cairn::SE3 T_world_camera_;
   cairn::SE3 T_last_camera_;  // motion of the last step, for the prediction
   cairn::Matrix<6> pose_covariance_;

@@ -3,105 +3,188 @@
 #include "riding_along.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <utility>
 
 #include <cairn/core/statistics.hpp>
 
-#include "descriptor_distance.hpp"
-
 namespace stereo_slam {
 namespace {
 
-constexpr int sure = 3;             // frames
-constexpr int strange_frames = 8;   // in a row, after which a cell is given back
-constexpr int longest_memory = 30;  // frames: light changes what a body looks like
+using Pixels = std::vector<cairn::Vector<2>>;
+constexpr int doubtful_frames = 8;  // after the last frame that was in doubt
 
-}  // namespace
+using Indices = std::vector<std::size_t>;
 
-HiddenCells::HiddenCells(int width, int height)
-    : side_(std::max(8, std::min(width, height) / 12)),
-      columns_(width / side_ + 1),
-      rows_(height / side_ + 1),
-      cells_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), 0) {}
-
-std::size_t HiddenCells::cell_of(double x, double y) const noexcept {
-  const int column = std::clamp(static_cast<int>(x) / side_, 0, columns_ - 1);
-  const int row = std::clamp(static_cast<int>(y) / side_, 0, rows_ - 1);
-  return static_cast<std::size_t>(row * columns_ + column);
+/// How far a point may wander that stands still: what shakes by half a pixel, and the noise of its keypoint.
+double stillness(const cairn::StereoMatch& match) {
+  return 1 + 3 * match.sigma_left;
 }
 
-void HiddenCells::set(std::size_t cell, bool hidden) noexcept {
-  if (hidden != (cells_[cell] != 0)) count_ = hidden ? count_ + 1 : count_ - 1;
-  cells_[cell] = hidden ? 1 : 0;
+/// Whether both images show a match's landmark where they showed it first.
+bool stands_still(const MatchesOfFrame& seen, std::size_t i) {
+  return (seen.apparent[i].now - seen.apparent[i].first).cwiseAbs().maxCoeff() < stillness(seen.matches[i]);
 }
 
-std::size_t HiddenCells::unlike(const HiddenCells& other) const {
-  std::size_t result = 0;
-  for (std::size_t i = 0; i < cells_.size(); ++i) result += cells_[i] != other.cells_[i] ? 1 : 0;
+/// Matches that stand still though the camera, were it there, would see them elsewhere than at first, by more
+/// than twice what stillness allows.
+Indices still_against(const cairn::SE3& T_world_camera, const cairn::PinholeCamera& left,
+                      const MatchesOfFrame& seen) {
+  Indices result;
+  const cairn::SE3 T_camera_world = T_world_camera.inverse();
+  for (std::size_t i = 0; i < seen.matches.size(); ++i) {
+    if (!stands_still(seen, i)) continue;
+    const auto due = left.project(T_camera_world * seen.matches[i].landmark);
+    if (!due || (*due - seen.apparent[i].first.head<2>()).norm() > 2 * stillness(seen.matches[i]))
+      result.push_back(i);
+  }
   return result;
 }
 
-RidingAlong::RidingAlong(int width, int height) : hidden_(width, height), cells_(hidden_.size()) {}
-
-double RidingAlong::share() const noexcept {
-  return static_cast<double>(hidden_.count()) / static_cast<double>(hidden_.size());
+/// How far those of them reach that count.
+template <class Counts>
+double reach_of(const Indices& some, const MatchesOfFrame& seen, const Counts& counts) {
+  Pixels pixels;
+  for (const std::size_t i : some)
+    if (counts(i)) pixels.push_back(seen.matches[i].left);
+  return pixels.empty() ? 0 : reach(pixels);
 }
 
-void RidingAlong::judge(std::span<const cairn::Vector<2>> still, std::span<const cairn::Vector<2>> moved) {
-  std::vector<int> votes(cells_.size(), 0);
-  for (const cairn::Vector<2>& pixel : still) ++votes[hidden_.cell_of(pixel(0), pixel(1))];
-  for (const cairn::Vector<2>& pixel : moved) --votes[hidden_.cell_of(pixel(0), pixel(1))];
-  for (std::size_t i = 0; i < cells_.size(); ++i) {
-    if (hidden_.hidden(i) || votes[i] == 0) continue;
-    int& score = cells_[i].score;
-    score = std::clamp(score + (votes[i] > 0 ? 1 : -1), -sure, sure);
-    if (score == sure) hidden_.set(i, true);
-  }
-}
-
-/// Whether a cell around the point remembers one like it at its place.
-bool RidingAlong::shows_again(const cairn::Keypoint& point, std::span<const float> descriptor) const {
-  constexpr float near = 2.5F;            // [pixels]
-  constexpr float alike = 0.45F * 0.45F;  // of unit descriptors, squared
-  for (const float dx : {-near, near})
-    for (const float dy : {-near, near})
-      for (const Remembered& before : cells_[hidden_.cell_of(point.x + dx, point.y + dy)].remembered)
-        if (std::max(std::abs(before.x - point.x), std::abs(before.y - point.y)) < near &&
-            squared_distance(before.descriptor, descriptor) < alike)
-          return true;
-  return false;
-}
-
-void RidingAlong::watch(const cairn::Features& points) {
-  if (hidden_.count() == 0) return;
-  struct Count {
-    int seen = 0, again = 0;
+/// What a reach counts beside another's: more, where the one's points are farther, since what is nearer
+/// covers the rest. By disparities, which in rigs whose cameras look one way fall with the depth.
+double weight_of(const Indices& some, const Indices& others, const MatchesOfFrame& seen) {
+  constexpr double most = 4;  // a vehicle far ahead is a part of no world
+  const auto nearness = [&](const Indices& of) {
+    std::vector<double> disparities;
+    for (const std::size_t i : of)
+      disparities.push_back((seen.matches[i].left - seen.matches[i].right).norm());
+    return disparities.empty() ? 0 : cairn::median(std::move(disparities));
   };
-  std::vector<Count> counts(cells_.size());
-  std::vector<std::vector<Remembered>> now(cells_.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const cairn::Keypoint& point = points.keypoints[i];
-    if (!hidden_.hides(point.x, point.y)) continue;
-    const std::span<const float> descriptor = points.descriptor(i);
-    const std::size_t cell = hidden_.cell_of(point.x, point.y);
-    ++counts[cell].seen;
-    counts[cell].again += shows_again(point, descriptor) ? 1 : 0;
-    now[cell].push_back({point.x, point.y, {descriptor.begin(), descriptor.end()}});
+  const double one = nearness(some), other = nearness(others);
+  return one > 0 && other > 0 ? std::clamp(other / one, 1 / most, most) : 1;
+}
+
+/// The motion of some of the matches, where enough agree on one; its inliers are of all matches.
+std::optional<cairn::StereoPose> motion_of(const Indices& some, const MatchesOfFrame& seen,
+                                           const RidingAlong::Estimate& estimate, std::size_t enough) {
+  std::vector<cairn::StereoMatch> part;
+  for (const std::size_t i : some) part.push_back(seen.matches[i]);
+  cairn::StereoPose result = estimate(part);
+  if (!result.good() || result.inlier_count < enough) return std::nullopt;
+  std::vector<std::uint8_t> inliers(seen.matches.size(), 0);
+  for (std::size_t k = 0; k < some.size(); ++k) inliers[some[k]] = result.inliers[k];
+  result.inliers = std::move(inliers);
+  return result;
+}
+
+}  // namespace
+
+RidingAlong::RidingAlong(cairn::ImageView left, cairn::ImageView right, const RidingAlongOptions& options)
+    : options_(options),
+      cells_{RidingCells(left.width(), left.height()), RidingCells(right.width(), right.height())} {}
+
+void RidingAlong::watch(const cairn::Features& left, const cairn::Features& right) {
+  cells_[0].watch(left);
+  cells_[1].watch(right);
+}
+
+bool RidingAlong::hides(const cairn::Vector<2>& left, const cairn::Vector<2>& right) const noexcept {
+  return cells_[0].hidden().hides(left(0), left(1)) || cells_[1].hidden().hides(right(0), right(1));
+}
+
+RidingAlong::Decision RidingAlong::decide(cairn::StereoPose pose, const cairn::PinholeCamera& left,
+                                          const MatchesOfFrame& seen, const Estimate& estimate) {
+  Decision decision = weigh(std::move(pose), left, seen, estimate);
+  if (decision.riding.size() < options_.fewest)
+    decision.riding.clear();
+  else
+    judge(decision, seen);
+  return decision;
+}
+
+/// The other motion, where it reaches farther over the image: that of those that moved, where most that agree
+/// on `pose`, or all that could, stand still; otherwise that of those that stand still, where it reaches
+/// twice as far and nothing is known to ride along, or half as far where that was the rig's motion against
+/// others before.
+RidingAlong::Decision RidingAlong::weigh(cairn::StereoPose pose, const cairn::PinholeCamera& left,
+                                         const MatchesOfFrame& seen, const Estimate& estimate) {
+  Indices still, moved;
+  std::size_t still_agree = 0, moved_agree = 0;
+  const auto agrees = [&](std::size_t i) { return pose.good() && pose.inliers[i] != 0; };
+  const auto all = [](std::size_t) { return true; };
+  const auto trusted = [&](std::size_t i) { return !cells_[0].suspects(seen.matches[i].left); };
+  for (std::size_t i = 0; i < seen.matches.size(); ++i) {
+    const bool stands = stands_still(seen, i);
+    (stands ? still : moved).push_back(i);
+    (stands ? still_agree : moved_agree) += agrees(i) ? 1 : 0;
   }
-  for (std::size_t i = 0; i < cells_.size(); ++i) {
-    Cell& cell = cells_[i];
-    if (counts[i].seen == 0) continue;
-    ++cell.age;
-    const bool strange = !cell.remembered.empty() && 4 * counts[i].again < counts[i].seen;
-    cell.strange = strange ? cell.strange + 1 : 0;
-    if (cell.strange >= strange_frames) {
-      cell = {};
-      hidden_.set(i, false);
-    } else if (cell.remembered.empty() || (!strange && cell.age > longest_memory)) {
-      cell.remembered = std::move(now[i]);
-      cell.age = 0;
+  const bool stood = !pose.good() || still_agree > moved_agree;
+  const bool stood_before = std::exchange(stands_against_others_, false);
+  doubtful_ = std::max(0, doubtful_ - 1);
+  if (stood && moved.size() - moved_agree >= options_.fewest && still.size() >= options_.fewest) {
+    if (auto other = motion_of(moved, seen, estimate, options_.fewest)) {
+      Indices against = still_against(other->T_world_camera, left, seen);
+      std::erase_if(moved, [&](std::size_t i) { return other->inliers[i] == 0; });
+      const double farther = weight_of(moved, against, seen) * reach_of(moved, seen, all);
+      const double reached = reach_of(against, seen, trusted);
+      if (moved.size() >= options_.fewest_sure && farther >= reached)
+        return {std::move(*other), std::move(against)};
+      if (against.size() >= options_.fewest) doubtful_ = doubtful_frames;
+      stands_against_others_ = reached >= 2 * farther;
     }
   }
+  if (!pose.good()) return {std::move(pose), {}};
+  Indices against = still_against(pose.T_world_camera, left, seen);
+  if (!stood && against.size() >= options_.fewest && cells_[0].hidden().count() == 0) {
+    const double farther = weight_of(against, moved, seen) * reach_of(against, seen, trusted);
+    const double reached = reach_of(moved, seen, agrees);
+    if (against.size() >= options_.fewest_sure && farther >= (stood_before ? 0.5 : 2) * reached)
+      if (auto other = motion_of(against, seen, estimate, options_.fewest_sure)) {
+        stands_against_others_ = true;
+        against = still_against(other->T_world_camera, left, seen);
+        return {std::move(*other), std::move(against)};
+      }
+    if (farther >= reached) doubtful_ = doubtful_frames;
+  }
+  return {std::move(pose), std::move(against)};
+}
+
+void RidingAlong::judge(const Decision& decision, const MatchesOfFrame& seen) {
+  std::array<Pixels, 2> still, moved;
+  const auto add = [&](std::array<Pixels, 2>& to, std::size_t i) {
+    to[0].push_back(seen.apparent[i].now.head<2>());
+    to[1].push_back(seen.apparent[i].now.tail<2>());
+  };
+  for (const std::size_t i : decision.riding) add(still, i);
+  for (std::size_t i = 0; i < seen.matches.size(); ++i)
+    if (decision.pose.inliers[i] != 0 && !stands_still(seen, i)) add(moved, i);
+  for (const std::size_t side : {std::size_t{0}, std::size_t{1}})
+    cells_[side].judge(still[side], moved[side]);
+}
+
+std::optional<std::string> RidingAlong::close_frame(std::size_t index) {
+  const HiddenCells &left = cells_[0].hidden(), &right = cells_[1].hidden();
+  const std::size_t count = left.count() + right.count();
+  if (count == 0 && doubtful_ == 0) {
+    left_alone_.reset();
+  } else if (count == 0) {
+    if (!left_alone_ || !left_alone_->evenly)
+      left_alone_ = std::make_shared<const HiddenParts>(HiddenParts{{left, right}, true});
+  } else {
+    const auto unlike = [&](const HiddenParts& other) {
+      return left.unlike(other.cells[0]) + right.unlike(other.cells[1]);
+    };
+    if (!left_alone_ ||
+        8 * unlike(*left_alone_) > left_alone_->cells[0].count() + left_alone_->cells[1].count())
+      left_alone_ = std::make_shared<const HiddenParts>(HiddenParts{{left, right}, false});
+  }
+  record_.share = cells_[0].share();
+  record_.largest_share = std::max(record_.largest_share, record_.share);
+  if (record_.since || !(record_.share > 0)) return std::nullopt;
+  record_.since = index;
+  return "from frame " + std::to_string(index) +
+         " on a part of the image is left out: what is seen there stands still while the "
+         "camera moves, as its own vehicle or mount, dirt on the lenses, or what drives ahead";
 }
 
 double reach(std::span<const cairn::Vector<2>> pixels) {

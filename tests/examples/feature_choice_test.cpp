@@ -87,6 +87,23 @@ TEST_SUITE("feature_choice") {
     }
   }
 
+  TEST_CASE("make_extractor: evenly there are points beside what has the strongest, and no fewer in all") {
+    const cairn::Image whole = cairn_test::texture(480, 320, 4);
+    const cairn::Image image = cairn_test::picture(480, 320, [&](int x, int y) {
+      return cairn_test::grey(x < 240 ? whole(x, y) : 120 + 0.15 * (whole(x, y) - 120));
+    });
+    const auto beside = [&](bool evenly) {
+      stereo_slam::Extractor extract = stereo_slam::make_extractor({.points = 400, .evenly = evenly});
+      const cairn::Features& points = extract(image);
+      CHECK(points.size() == 400);
+      return std::ranges::count_if(points.keypoints, [](const cairn::Keypoint& p) { return p.x > 250; });
+    };
+    const auto strongest = beside(false), evenly = beside(true);
+    CAPTURE(strongest);
+    CHECK(strongest < 40);
+    CHECK(evenly > 120);
+  }
+
   TEST_CASE("make_extractor: empty, plain and tiny pictures have no points") {
     for (const FeatureKind kind : kinds()) {
       stereo_slam::Extractor extract = stereo_slam::make_extractor({.kind = kind});
