@@ -48,6 +48,7 @@ public:
     for (int index = 0; index < options.octaves; ++index)
       octaves_.emplace_back(index, options.intervals, options.initial_step);
     phases_.resize(octaves_.size());
+    shared_.resize(octaves_.size());
   }
 
   /// Replaces `found` by the maxima of the image under `sums`, ordered by octave, row, filter and column; the
@@ -64,19 +65,25 @@ public:
                    }
                  });
     bands_.clear();
+    std::vector<std::size_t> first;  // band of each octave
     for (std::size_t octave = 0; octave < octaves_.size(); ++octave) {
+      shared_[octave].prepare(octave > 0 ? &octaves_[octave - 1] : nullptr, octaves_[octave], sums.width(),
+                              sums.height());
+      first.push_back(bands_.size());
       const int rows = (sums.height() + octaves_[octave].step - 1) / octaves_[octave].step;
       for (int begin = 0; begin < rows; begin += rows_a_band)
         bands_.push_back({octave, begin, std::min(begin + rows_a_band, rows)});
     }
+    first.push_back(bands_.size());
     found_.resize(bands_.size());
     const std::size_t workers = std::max(threads, 1U);
     memory_.resize(workers);
-    parallel_for(workers, threads, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t worker = begin; worker < end; ++worker)
-        for (std::size_t band = worker; band < bands_.size(); band += workers)
-          scan(sums, band, memory_[worker]);
-    });
+    for (std::size_t octave = 0; octave < octaves_.size(); ++octave)  // an octave needs the one before
+      parallel_for(workers, threads, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t worker = begin; worker < end; ++worker)
+          for (std::size_t band = first[octave] + worker; band < first[octave + 1]; band += workers)
+            scan(sums, band, memory_[worker]);
+      });
     for (const std::vector<Keypoint>& part : found_) found.insert(found.end(), part.begin(), part.end());
   }
 
@@ -96,13 +103,17 @@ private:
   void scan(const IntegralImage& sums, std::size_t index, detail::ScannerMemory& memory) {
     const Band& band = bands_[index];
     found_[index].clear();
-    detail::OctaveScanner(sums, phases_[band.octave], octaves_[band.octave], threshold_, memory)
+    detail::SharedResponses* const next =
+        band.octave + 1 < octaves_.size() ? &shared_[band.octave + 1] : nullptr;
+    detail::OctaveScanner(sums, phases_[band.octave], octaves_[band.octave], threshold_, shared_[band.octave],
+                          next, memory)
         .scan(band.begin, band.end, found_[index]);
   }
 
   float threshold_;
   std::vector<detail::Octave> octaves_;
   std::vector<detail::ColumnPhases> phases_;
+  std::vector<detail::SharedResponses> shared_;
   std::vector<Band> bands_;
   std::vector<detail::ScannerMemory> memory_;
   std::vector<std::vector<Keypoint>> found_;

@@ -24,6 +24,7 @@
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/linalg.hpp>
 #include <cairn/manifold/se3.hpp>
+#include <cairn/simd/processor.hpp>
 #include <cairn/slam/detail/keyframe_landmark.hpp>
 #include <cairn/slam/world_pose.hpp>
 #include <cairn/version.hpp>
@@ -43,7 +44,7 @@ public:
   void open(std::size_t keyframes, bool with_rig = false) {
     size_ = keyframes + 1;
     with_rig_ = with_rig;
-    rig_.assign(with_rig ? size_ : 0, Matrix<6, rig_numbers>::Zero());
+    rig_.assign(with_rig ? size_ : 0, Matrix<rig_numbers, 6>::Zero());
     rig_information_.setZero();
     rig_gradient_.setZero();
     blocks_.assign(size_ * size_, Matrix<6>::Zero());
@@ -73,25 +74,38 @@ public:
   /// What the match says of the rig, besides.
   void add_rig(const LandmarkGeometry& landmark, std::span<const std::uint32_t> place,
                const WeighedSighting& seen, const RigStatistics& rig, double weight) {
-    const Matrix<3, rig_numbers> GE = product(seen.G, rig.E),
-                                 K = product(seen.N, landmark.B) + GE;  // J^T W (J B + J_c)
-    for (std::size_t i = 0; i < landmark.count; ++i)
-      add_rig_block(place[i], weight * transposed_product(landmark.F[i], K), landmark.x);
-    add_rig_block(static_cast<std::uint32_t>(size_ - 1), -weight * K, landmark.x);
-    const Matrix<3, rig_numbers> SE = product(landmark.S, rig.E);
-    const Matrix<rig_numbers> direct = rig.D - transposed_product(SE, GE);
-    rig_information_ +=
-        weight * symmetrised(Matrix<rig_numbers>(transposed_product(landmark.B, K) +
-                                                 transposed_product(GE, landmark.B) + direct));
-    rig_gradient_ +=
-        weight * (transposed_product(landmark.B, seen.g) + rig.u - transposed_product(SE, seen.g));
+    // The rig's numbers stand side by side, in whole registers.
+    with_avx2_lanes([&]() CAIRN_INLINED {
+      double B[3][rig_numbers], E[3][rig_numbers], GE[3][rig_numbers], SE[3][rig_numbers], K[3][rig_numbers];
+      for (int k = 0; k < 3; ++k)
+        for (int c = 0; c < rig_numbers; ++c) {
+          B[k][c] = landmark.B(k, c);
+          E[k][c] = rig.E(k, c);
+        }
+      combine(seen.G, E, GE);
+      combine(landmark.S, E, SE);
+      combine(seen.N, B, K);
+      for (int k = 0; k < 3; ++k)
+        for (int c = 0; c < rig_numbers; ++c) K[k][c] += GE[k][c];  // J^T W (J B + J_c)
+      for (std::size_t i = 0; i < landmark.count; ++i) {
+        double moved[3][rig_numbers];
+        combine(transposed(landmark.F[i]), K, moved);
+        add_rig_block(place[i], weight, moved, landmark.x);
+      }
+      add_rig_block(static_cast<std::uint32_t>(size_ - 1), -weight, K, landmark.x);
+      add_rig_information(B, K, GE, SE, rig.D, weight);
+      const Vector<3>& g = seen.g;
+      for (int c = 0; c < rig_numbers; ++c)
+        rig_gradient_(c) += weight * ((B[0][c] * g(0) + B[1][c] * g(1) + B[2][c] * g(2)) + rig.u(c) -
+                                      (SE[0][c] * g(0) + SE[1][c] * g(1) + SE[2][c] * g(2)));
+    });
   }
 
   /// Multiplies all that was added.
   void scale(double factor) {
     for (Matrix<6>& block : blocks_) block *= factor;
     for (Vector<6>& part : gradient_) part *= factor;
-    for (Matrix<6, rig_numbers>& block : rig_) block *= factor;
+    for (Matrix<rig_numbers, 6>& block : rig_) block *= factor;
     rig_information_ *= factor;
     rig_gradient_ *= factor;
   }
@@ -135,8 +149,8 @@ public:
     if (!with_rig_) return Q;
     const Eigen::Index rig = n - 6 - rig_numbers;
     for (std::size_t a = 0; a < size_; ++a) {
-      Q.block<6, rig_numbers>(row_of(a), rig) = rig_[a];
-      Q.block<rig_numbers, 6>(rig, row_of(a)) = rig_[a].transpose();
+      Q.block<6, rig_numbers>(row_of(a), rig) = rig_[a].transpose();
+      Q.block<rig_numbers, 6>(rig, row_of(a)) = rig_[a];
     }
     Q.block<rig_numbers, rig_numbers>(rig, rig) = rig_information_;
     return Q;
@@ -154,14 +168,48 @@ private:
     return 6 * static_cast<Eigen::Index>(block) + (with_rig_ && block + 1 == size_ ? rig_numbers : 0);
   }
 
-  /// G^T K of (1), for the rig's columns.
-  void add_rig_block(std::uint32_t a, const Matrix<3, rig_numbers>& K, const Vector<3>& x) {
-    for (int c = 0; c < rig_numbers; ++c)
-      for (int i = 0; i < 3; ++i) {
-        const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
-        rig_[a](i, c) += K(i, c);
-        rig_[a](3 + i, c) += x(i1) * K(i2, c) - x(i2) * K(i1, c);
+  /// The rows of M times those of `rows`.
+  [[gnu::always_inline]] static void combine(const Matrix<3>& M, const double (&rows)[3][rig_numbers],
+                                             double (&result)[3][rig_numbers]) noexcept {
+    for (int i = 0; i < 3; ++i)
+      for (int c = 0; c < rig_numbers; ++c)
+        result[i][c] = M(i, 0) * rows[0][c] + M(i, 1) * rows[1][c] + M(i, 2) * rows[2][c];
+  }
+
+  /// weight G^T K of (1), for the rig's columns.
+  [[gnu::always_inline]] void add_rig_block(std::uint32_t a, double weight, const double (&K)[3][rig_numbers],
+                                            const Vector<3>& x) noexcept {
+    double weighted[3][rig_numbers];
+    for (int i = 0; i < 3; ++i)
+      for (int c = 0; c < rig_numbers; ++c) weighted[i][c] = weight * K[i][c];
+    double* const to = rig_[a].data();
+    for (int i = 0; i < 3; ++i) {
+      const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
+      for (int c = 0; c < rig_numbers; ++c) {
+        to[i * rig_numbers + c] += weighted[i][c];
+        to[(3 + i) * rig_numbers + c] += x(i1) * weighted[i2][c] - x(i2) * weighted[i1][c];
       }
+    }
+  }
+
+  /// weight (B^T K + GE^T B + D - SE^T GE), symmetric but for rounding, which is taken out.
+  [[gnu::always_inline]] void add_rig_information(const double (&B)[3][rig_numbers],
+                                                  const double (&K)[3][rig_numbers],
+                                                  const double (&GE)[3][rig_numbers],
+                                                  const double (&SE)[3][rig_numbers],
+                                                  const Matrix<rig_numbers>& D, double weight) noexcept {
+    double sum[rig_numbers][rig_numbers];
+    for (int c = 0; c < rig_numbers; ++c) {
+      const double* const d = D.data() + c * rig_numbers;
+      for (int r = 0; r < rig_numbers; ++r) {
+        const double direct = d[r] - (SE[0][r] * GE[0][c] + SE[1][r] * GE[1][c] + SE[2][r] * GE[2][c]);
+        sum[c][r] = (B[0][r] * K[0][c] + B[1][r] * K[1][c] + B[2][r] * K[2][c]) +
+                    (GE[0][r] * B[0][c] + GE[1][r] * B[1][c] + GE[2][r] * B[2][c]) + direct;
+      }
+    }
+    for (int c = 0; c < rig_numbers; ++c)
+      for (int r = 0; r < rig_numbers; ++r)
+        rig_information_(r, c) += weight * (0.5 * (sum[c][r] + sum[r][c]));
   }
 
   /// G^T K G of (1) = [K, -K X; X K, -X K X], X = skew(x).
@@ -194,7 +242,7 @@ private:
   std::vector<Matrix<6>> blocks_;  // of rows a and columns b >= a, row by row
   std::vector<Vector<6>> gradient_;
   bool with_rig_ = false;
-  std::vector<Matrix<6, rig_numbers>> rig_;  // of rows a and the rig's columns
+  std::vector<Matrix<rig_numbers, 6>> rig_;  // of the rig's rows and columns a
   Matrix<rig_numbers> rig_information_ = Matrix<rig_numbers>::Zero();
   RigState rig_gradient_ = RigState::Zero();
 };
