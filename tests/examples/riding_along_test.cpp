@@ -168,11 +168,11 @@ TEST_SUITE("riding along") {
       "riding along: of a rig that drives what stands still has to reach twice as far to be the world") {
     RidingAlong what = nothing_known();
     Frame frame(ahead(1), 3);
-    frame.see(300, {40, 5, 635, 150});
-    const auto body = frame.carry(60, {40, 80, 635, 235});
+    frame.see(300, {100, 20, 540, 170});
+    frame.carry(60, whole, 8, 12);
     const RidingAlong::Decision decision = frame.decide(what);
     CHECK(frame.is_here(decision.pose.T_world_camera));
-    CHECK(decision.riding == body);
+    CHECK(decision.riding.size() > 40);
   }
 
   TEST_CASE(
