@@ -214,6 +214,17 @@ TEST_SUITE("grid_slam/program") {
     }
     CHECK(cairn::read_file(folder / "map") == map);
     CHECK(run("--load " + named("map") + " --resolution 0.1" + with_log).says("cells of 0.05 m"));
+    for (const char* way : {"", " --localise"}) {  // not silently with the rendered drive
+      const Outcome without_log = run("--load " + named("map") + way + " --out " + named("none"));
+      CHECK(without_log.code == 2);
+      CHECK(without_log.says("--load goes on with a log: expected --log too, or --simulate"));
+    }
+    const Outcome wide = run("--load " + named("map") + " --localise --window -500 -500 500 500 --log " +
+                             named("log") + " --out " + named("none"));
+    CHECK(wide.code == 2);
+    CHECK(wide.says(
+        "expected a window of no more than 795 m a side, in a map of cells of 0.05 m; found 1000 m"));
+    CHECK_FALSE(fs::exists(folder / "none"));
     CHECK(run("--load " + named("torn") + with_log).says("bytes after the head, expected"));
     CHECK(run("--load " + named("map") + " --localise --window 500 500 510 510" + with_log)
               .says("outside of the map"));
