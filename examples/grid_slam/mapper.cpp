@@ -140,6 +140,7 @@ cairn::Gaussian<SE2> Mapper::newest() const {
 
 bool Mapper::add(const cairn::StampedScan& scan) {
   const Motion before = motion_;
+  const Unseen unseen_before = unseen_;
   const std::size_t steps = steps_.size();
   bool due = scans_.empty(), stopped = false;
   if (due) {
@@ -164,6 +165,7 @@ bool Mapper::add(const cairn::StampedScan& scan) {
       scans_.pop_back();
       points_.resize(steps);
       motion_ = before;
+      unseen_ = unseen_before;
     }
     throw;
   }
