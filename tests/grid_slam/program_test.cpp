@@ -172,6 +172,10 @@ TEST_SUITE("grid_slam/program") {
       CHECK(names_in(folder / way) == results());
       for (const char* name : {"map.pgm", "map.yaml", "trajectory.txt"})
         CHECK(cairn::read_file(folder / "stop --threads 1" / name) == cairn::read_file(folder / way / name));
+      if (!example::has_report_page()) continue;
+      const std::string page = cairn::read_file(folder / way / "report.html");
+      CHECK(page.find("Spread of the newest pose") != std::string::npos);
+      CHECK(page.find("Memory of the maps") != std::string::npos);
     }
     CHECK(cairn::read_file(folder / "ancestry --threads 1" / "summary.json") ==
           cairn::read_file(folder / "ancestry --threads 3" / "summary.json"));
