@@ -62,6 +62,7 @@ struct Results {
   std::vector<double> time, effective_size;
   std::vector<cairn::SE2> truth, odometry, path;  ///< one pose a scan; path is the best particle's
   std::vector<std::vector<cairn::SE2>> paths;     ///< of all particles, equal ones once
+  /// Of the particles alone: too sure, since what their common ancestors erred is not in it.
   cairn::Gaussian<cairn::SE2> newest;
   std::string drive;  ///< its name
   SigmaImage odometry_map, filter_map;

@@ -56,8 +56,8 @@ public:
   void operator()(T&... values) {
     (put(values), ...);
   }
-  [[nodiscard]] std::string file(std::string_view kind, std::uint64_t version) const {
-    return out_.file(kind, version);
+  [[nodiscard]] std::string file(std::string_view kind, std::uint64_t version) && {
+    return std::move(out_).file(kind, version);
   }
 
 private:

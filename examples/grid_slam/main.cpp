@@ -37,6 +37,8 @@ using namespace grid_slam;
 enum class Maps { tiles, ancestry, stop };
 enum class Frame { odometry, start };
 
+constexpr std::size_t film_frames = 48;  // of the report
+
 struct Options {
   Maps map = Maps::tiles;
   Frame frame = Frame::odometry;
@@ -113,7 +115,7 @@ Results map_stops(const Options& options, const Input& input) {
   prepare_folder(options.out);
   const example::Interruption interruption;
   example::Progress progress(std::clog, "scans", input.log.scans.size());
-  return run_stop_mapper(input.log, made, input.relations, watched(progress));
+  return run_stop_mapper(input.log, made, input.relations, watched(progress), film_frames);
 }
 
 Results map_occupancy(const Options& options, const Input& input, std::optional<Mapper>& mapper) {
@@ -121,8 +123,7 @@ Results map_occupancy(const Options& options, const Input& input, std::optional<
   prepare_folder(options.out, {options.save});
   const example::Interruption interruption;
   example::Progress progress(std::clog, "scans", input.log.scans.size());
-  constexpr std::size_t frames = 48;  // of the report's film
-  return run(*mapper, input.log, input.relations, watched(progress), frames);
+  return run(*mapper, input.log, input.relations, watched(progress), film_frames);
 }
 
 void print(const Results& r, const std::filesystem::path& out) {
@@ -167,8 +168,10 @@ int main(int argc, char** argv) {
       ->transform(example::one_of<Frame>({{"odometry", Frame::odometry}, {"start", Frame::start}}))
       ->type_name("NAME")
       ->default_str("odometry");
-  app.add_option("--proposal", options.proposal,
-                 "of --map stop and ancestry: poses drawn from odometry (motion), or where the scan matches")
+  app.add_option(
+         "--proposal", options.proposal,
+         "of --map stop and ancestry: poses drawn from odometry (motion; the covariance of the newest "
+         "pose is then too small), or where the scan matches")
       ->transform(
           example::one_of<StopProposal>({{"motion", StopProposal::motion}, {"match", StopProposal::match}}))
       ->type_name("NAME")
@@ -207,6 +210,8 @@ int main(int argc, char** argv) {
       cairn::raise("--proposal is for --map stop and --map ancestry");
     if (app.count("--frame") > 0 && (options.map != Maps::tiles || !options.load.empty()))
       cairn::raise("--frame is for a new map of --map tiles");
+    if (!options.load.empty() && options.log.empty() && !options.simulate)
+      cairn::raise("--load goes on with a log: expected --log too, or --simulate for the rendered drive");
     example::expect_not_read(options.save, {options.log, options.relations});
     const Input input = input_of(options);
     std::optional<Mapper> mapper;

@@ -256,8 +256,9 @@ void Mapper::save(const std::filesystem::path& path) const {
   Writer writer;
   writer(options.cell_size, options.field_radius, options.model, options.particles, options.seed, record,
          cells);
+  cells = {};  // as large as the file
   plain_parts(writer, copy);
-  cairn::write_file_atomically(path, writer.file(kind, version));
+  cairn::write_file_atomically(path, std::move(writer).file(kind, version));
 }
 
 Mapper Mapper::loaded(const std::filesystem::path& path, const MapRequest& wanted) {

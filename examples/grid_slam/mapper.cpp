@@ -17,6 +17,7 @@
 #include <cairn/core/parallel.hpp>
 #include <cairn/core/random.hpp>
 #include <cairn/core/statistics.hpp>
+#include <cairn/io/text.hpp>
 #include <cairn/manifold/so2.hpp>
 #include <cairn/scan/correlative.hpp>
 #include <cairn/scan/match.hpp>
@@ -60,6 +61,9 @@ double share_of_changed(const cairn::LaserScan& a, const cairn::LaserScan& b) {
   }
   return both > 0 ? changed / both : 0;
 }
+
+/// [m]: where a first scan is looked for, farther points say little more and cost much.
+constexpr double first_view = 12;
 
 /// Points of several scans, seen from the last pose.
 std::vector<ScanPoint> seen_together(const std::vector<SE2>& poses,
@@ -213,6 +217,11 @@ Mapper Mapper::localiser(const std::filesystem::path& path, const MapRequest& wa
   if (!(w.left < w.right && w.bottom < w.top) || !std::isfinite(w.right - w.left) ||
       !std::isfinite(w.top - w.bottom))
     cairn::raise("expected a window whose left is below its right, and whose bottom is below its top");
+  const double widest = std::floor((cairn::ScoreGrid::most - 1) * options.cell_size - 2 * first_view);
+  if (const double wide = std::max(w.right - w.left, w.top - w.bottom); wide > widest)
+    cairn::raise("expected a window of no more than " + cairn::shortest(widest) +
+                 " m a side, in a map of cells of " + cairn::shortest(options.cell_size) + " m; found " +
+                 cairn::shortest(wide) + " m");
   bool known = false;
   const cairn::GridGeometry& geometry = mapper.frozen_->grid.geometry();
   mapper.frozen_->grid.cells().for_each_tile([&](cairn::TileAddress address, const auto& tile) {
@@ -229,14 +238,13 @@ Mapper Mapper::localiser(const std::filesystem::path& path, const MapRequest& wa
 }
 
 cairn::Gaussian<SE2> Mapper::place_in_window(const cairn::StampedScan& scan) {
-  constexpr double view = 12;  // [m]: farther points say little more and cost much
   const double x = 0.5 * (window_->left + window_->right), y = 0.5 * (window_->bottom + window_->top);
   const double half_x = window_->right - x, half_y = window_->top - y;
   std::vector<ScanPoint> near;
   for (const ScanPoint& p : cairn::scan_points(scan.scan))
-    if (std::hypot(p.x, p.y) < view) near.push_back(p);
+    if (std::hypot(p.x, p.y) < first_view) near.push_back(p);
   const cairn::OccupancyGrid& grid = frozen_->grid;
-  const cairn::CorrelativeSearch search(scores_around(grid, x, y, std::max(half_x, half_y) + view), 6);
+  const cairn::CorrelativeSearch search(scores_around(grid, x, y, std::max(half_x, half_y) + first_view), 6);
   const auto found =
       search.find_places(cairn::thinned(near, 0.2), SE2(x, y, 0), {half_x, half_y, std::numbers::pi}, 4, {},
                          options_.loops.enough_score);

@@ -159,6 +159,8 @@ public:
   /// soon, comes what the path of the best of them has gathered, step by step, since it began, and what loops
   /// have told of it since. In a map that stays as it is, the particles' spread is all there is. O(steps).
   [[nodiscard]] cairn::Gaussian<cairn::SE2> newest() const;
+  /// Whether the map stays as it was loaded.
+  [[nodiscard]] bool localises() const noexcept { return frozen_.has_value(); }
   /// How far scans lag behind odometry, as far as turns have shown.
   [[nodiscard]] const ScanDelay& delay() const noexcept { return delay_; }
   /// Of a localiser with a window that has taken a scan: the place where it began, then those that look like

@@ -197,13 +197,10 @@ void add_film(example::Report& page, const Results& r) {
 #endif
 
 void add_spread(example::Report& page, const Results& r) {
-  std::vector<double> step, size, sigma, turn;
+  std::vector<double> step, size;
   for (std::size_t k = 0; k < r.steps.size(); ++k) {
     step.push_back(static_cast<double>(k));
     size.push_back(r.steps[k].effective_size);
-    const auto& p = r.steps[k].pose.covariance;
-    sigma.push_back(std::sqrt(p(0, 0) + p(1, 1)));
-    turn.push_back(std::sqrt(p(2, 2)) * degrees);
   }
   page.add(example::LinePlot{.title = "Effective number of particles",
                              .caption = "1 / sum of the squared weights, before resampling.",
@@ -211,15 +208,29 @@ void add_spread(example::Report& page, const Results& r) {
                              .y = {"N_eff", ""},
                              .x_values = step,
                              .curves = {{"N_eff", Ink::belief, size}}});
-  page.add(example::LinePlot{
-      .title = "Spread of the newest pose",
-      .caption = "Standard deviation of the newest pose over all particles: in the map's frame, which begins "
-                 "where the robot began. It grows with the path and falls where a loop closes.",
-      .x = {"processed scan", ""},
-      .y = {"sigma", "m, deg"},
-      .x_values = step,
-      .curves = {{"position [m]", Ink::belief, sigma}, {"heading [deg]", Ink::teal, turn}},
-      .logarithmic = true});
+  if (r.snapshots.empty()) return;
+  std::vector<double> at, sigma, turn;
+  for (const Snapshot& s : r.snapshots) {
+    at.push_back(static_cast<double>(s.processed));
+    sigma.push_back(std::sqrt(s.newest(0, 0) + s.newest(1, 1)));
+    turn.push_back(std::sqrt(s.newest(2, 2)) * degrees);
+  }
+  const std::string path =
+      "Standard deviation of the newest pose, seen from where the map begins: of the particles' spread and "
+      "of "
+      "what the best one's path has gathered step by step, less what loops have told of it.";
+  const std::string particles =
+      "Standard deviation of the newest pose over all particles. It does not hold what they all have in "
+      "common, "
+      "as the steps of a common ancestor.";
+  page.add(
+      example::LinePlot{.title = "Spread of the newest pose",
+                        .caption = r.newest_has_path ? path : particles,
+                        .x = {"processed scan", ""},
+                        .y = {"sigma", "m, deg"},
+                        .x_values = at,
+                        .curves = {{"position [m]", Ink::belief, sigma}, {"heading [deg]", Ink::teal, turn}},
+                        .logarithmic = true});
 }
 
 void add_memory(example::Report& page, const Results& r) {
@@ -230,13 +241,15 @@ void add_memory(example::Report& page, const Results& r) {
     shared.push_back(static_cast<double>(s.bytes) / 1048576.0);
     separate.push_back(static_cast<double>(s.separate_bytes) / 1048576.0);
   }
+  std::vector<example::Curve> curves{{"held", Ink::belief, shared}};
+  if (separate.back() > 0) curves.push_back({"if each had its own", Ink::grey, separate});
   page.add(example::LinePlot{
       .title = "Memory of the maps",
-      .caption = "All particles' maps together: tiles that several particles have in common are held once.",
+      .caption = "All particles' maps together: what several particles have in common is held once.",
       .x = {"processed scan", ""},
       .y = {"memory", "MB"},
       .x_values = step,
-      .curves = {{"held", Ink::belief, shared}, {"if each had its own", Ink::grey, separate}},
+      .curves = curves,
       .logarithmic = true});
 }
 
@@ -288,12 +301,10 @@ Snapshot snapshot_of(const Mapper& mapper) {
              .processed = mapper.steps().size(),
              .loops = mapper.loops().size(),
              .effective_size = mapper.steps().empty() ? 0 : mapper.steps().back().effective_size,
+             .newest = mapper.newest().covariance,
              .map = PackedMap(map_image(belief[best].map.grid)),
              .bytes = map_bytes(belief)};
-  const auto record = belief.record();
-  for (const auto& [pose, parent] : record.nodes)
-    if (parent < record.nodes.size()) s.paths.push_back({record.nodes[parent].pose.pose, pose.pose});
-  for (const auto& pose : belief.path(best)) s.best.push_back(pose.pose);
+  put_paths(s, belief);
   for (std::size_t i = 0; i < belief.size(); ++i)
     belief[i].map.grid.cells().for_each_tile(
         [&](cairn::TileAddress, const auto& tile) { s.separate_bytes += tile.bytes(); });

@@ -35,12 +35,21 @@ namespace grid_slam {
 struct Snapshot {
   std::size_t scans = 0, processed = 0, loops = 0;  ///< so far
   double effective_size = 0;
-  PackedMap map;                                   ///< of the best particle
-  std::vector<std::array<cairn::SE2, 2>> paths{};  ///< steps of all particles' paths, each once
-  std::vector<cairn::SE2> best{};                  ///< the best particle's path
-  std::size_t bytes = 0;                           ///< as map_bytes()
-  std::size_t separate_bytes = 0;                  ///< if no particle shared anything
+  cairn::Matrix<3> newest = cairn::Matrix<3>::Zero();  ///< covariance of the newest pose
+  PackedMap map;                                       ///< of the best particle
+  std::vector<std::array<cairn::SE2, 2>> paths{};      ///< steps of all particles' paths, each once
+  std::vector<cairn::SE2> best{};                      ///< the best particle's path
+  std::size_t bytes = 0;                               ///< as map_bytes()
+  std::size_t separate_bytes = 0;                      ///< if no particle shared anything; 0: not known
 };
+/// Puts in all particles' paths and the best one's.
+template <class Map>
+void put_paths(Snapshot& s, const cairn::MappedPaths<Map>& belief) {
+  const auto record = belief.record();
+  for (const auto& [pose, parent] : record.nodes)
+    if (parent < record.nodes.size()) s.paths.push_back({record.nodes[parent].pose.pose, pose.pose});
+  for (const auto& pose : belief.path(belief.best())) s.best.push_back(pose.pose);
+}
 [[nodiscard]] Snapshot snapshot_of(const Mapper& mapper);
 
 struct Results {
@@ -53,6 +62,7 @@ struct Results {
   std::vector<cairn::StampedPose2> odometry, drawn, means, rematched;
   std::optional<cairn::RelationError> of_odometry, of_drawn, of_means, of_rematched;
   cairn::Gaussian<cairn::SE2> newest;
+  bool newest_has_path = true;  ///< its covariance has what the path gathered, not the particles' alone
   double delay = 0, delay_spread = 0;  ///< of scans behind odometry [scans]
   MapImage map;
   std::size_t bytes = 0;

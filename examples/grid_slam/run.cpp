@@ -86,6 +86,7 @@ Results run(Mapper& mapper, const cairn::CarmenLog& log, const std::vector<cairn
   r.means = mapper.trajectory(true);
   r.rematched = mapper.rematched();
   r.newest = mapper.newest();
+  r.newest_has_path = !mapper.localises();
   r.delay = mapper.delay().mean();
   r.delay_spread = mapper.delay().spread();
   r.map = map_image(mapper.belief()[mapper.belief().best()].map.grid);

@@ -153,6 +153,7 @@ std::optional<double> reading_of_no_return(const std::vector<StampedScan>& scans
   for (const StampedScan& each : scans)
     for (std::size_t i = 0; i < each.scan.size(); ++i)
       if (each.scan.kind(i) == BeamKind::hit) largest = std::max(largest, each.scan.range[i]);
+  if (!(largest > 0)) return std::nullopt;  // no hit, so there is nothing that is taken for one
   const std::vector<std::size_t> looked_at = scans_apart(scans, apart);
   const auto with_it = static_cast<std::size_t>(std::ranges::count_if(looked_at, [&](std::size_t k) {
     return std::ranges::find(scans[k].scan.range, largest) != scans[k].scan.range.end();
@@ -264,12 +265,16 @@ std::vector<std::string> check_scans(cairn::CarmenLog& log, const std::string& n
     notes = {"readings of " + cairn::shortest(static_cast<float>(*next)) +
              " m and more, the log's largest, are met all along the way: they are taken for no return"};
   }
-  double beams = 0, hits = 0;
+  double beams = 0, hits = 0, invalid = 0;
   for (const StampedScan& each : log.scans)
     for (std::size_t i = 0; i < each.scan.size(); ++i) {
       beams += 1;
       hits += each.scan.kind(i) == BeamKind::hit ? 1 : 0;
+      invalid += each.scan.kind(i) == BeamKind::invalid ? 1 : 0;
     }
+  if (invalid == beams)
+    notes.push_back("no reading is as much as " + cairn::shortest(log.scans.front().scan.nearest) +
+                    " m: all are invalid, and nothing is known of any beam");
   constexpr double few = 0.1;
   const bool strange = hits > 0 && hits < few * beams;
   if (strange)

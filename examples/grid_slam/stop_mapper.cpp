@@ -16,6 +16,7 @@
 #include <cairn/grid/shared_tiles.hpp>
 
 #include "filled_path.hpp"
+#include "loop_closing.hpp"
 #include "map_image.hpp"
 #include "room.hpp"
 #include "run.hpp"
@@ -131,6 +132,17 @@ std::size_t bytes_of(const cairn::MappedPaths<Map>& belief) {
   }
 }
 
+/// The same if no particle shared anything; 0 of a tree, which has no maps that could be told apart.
+template <class Map>
+std::size_t separate_bytes_of(const cairn::MappedPaths<Map>& belief) {
+  std::size_t bytes = 0;
+  if constexpr (!requires { belief[0].map.stops().cells().bytes(); })
+    for (std::size_t i = 0; i < belief.size(); ++i)
+      belief[i].map.stops().cells().for_each_tile(
+          [&](cairn::TileAddress, const auto& tile) { bytes += sizeof tile; });
+  return bytes;
+}
+
 template <class Map>
 class StopMapper {
 public:
@@ -167,20 +179,14 @@ public:
         scans_, steps_.size(), [&](std::size_t k) { return steps_[k].scan; },
         [&](std::size_t k) { return path[k + 1].pose; });
     // The mean of what was drawn from is an estimate where that knew of the scan, and none where it did not.
-    r.means = options_.proposal == StopProposal::motion
-                  ? r.drawn
-                  : filled_path(
-                        scans_, steps_.size(), [&](std::size_t k) { return steps_[k].scan; },
-                        [&](std::size_t k) { return path[k + 1].drawn_from.mean; });
+    r.means = !scans_are_matched() ? r.drawn
+                                   : filled_path(
+                                         scans_, steps_.size(), [&](std::size_t k) { return steps_[k].scan; },
+                                         [&](std::size_t k) { return path[k + 1].drawn_from.mean; });
     r.rematched = r.means;
-    r.newest = belief_.pose();
-    const auto& grid = belief_[belief_.best()].map.stops();
-    r.map = image_of(options_.map.geometry, grid.cells(), [&](const StopCell& cell) {
-      constexpr double enough = 0.2;  // of the beams through a cell
-      if (!(cell.length > 0)) return unknown_grey;
-      const double stopped = -std::expm1(-grid.stops_per_metre(cell) * options_.map.geometry.cell_size);
-      return stopped > enough ? occupied_grey : free_grey;
-    });
+    r.newest = newest();
+    r.newest_has_path = scans_are_matched();
+    r.map = map_picture();
     r.bytes = bytes_of(belief_);
     for (std::size_t i = 0; i < belief_.size(); ++i) {
       if (i > 0 && belief_[i].node == belief_[i - 1].node) continue;
@@ -189,7 +195,38 @@ public:
     }
   }
 
+  [[nodiscard]] Snapshot snapshot() const {
+    Snapshot s{.scans = scans_.size(),
+               .processed = steps_.size(),
+               .effective_size = steps_.back().effective_size,
+               .newest = newest().covariance,
+               .map = PackedMap(map_picture()),
+               .bytes = bytes_of(belief_),
+               .separate_bytes = separate_bytes_of(belief_)};
+    put_paths(s, belief_);
+    return s;
+  }
+
 private:
+  [[nodiscard]] bool scans_are_matched() const { return options_.proposal == StopProposal::match; }
+
+  /// Where scans are matched, the path's steps are as sure as the grid mapper's.
+  [[nodiscard]] Gaussian<SE2> newest() const {
+    Gaussian<SE2> pose = belief_.pose();
+    if (scans_are_matched()) pose.covariance += covariance_of_end(belief_.path(belief_.best()), {});
+    return pose;
+  }
+
+  [[nodiscard]] MapImage map_picture() const {
+    const auto& grid = belief_[belief_.best()].map.stops();
+    return image_of(options_.map.geometry, grid.cells(), [&](const StopCell& cell) {
+      constexpr double enough = 0.2;  // of the beams through a cell
+      if (!(cell.length > 0)) return unknown_grey;
+      const double stopped = -std::expm1(-grid.stops_per_metre(cell) * options_.map.geometry.cell_size);
+      return stopped > enough ? occupied_grey : free_grey;
+    });
+  }
+
   void process(const cairn::StampedScan& scan) {
     Matrix<3> noise = Vector<3>(1e-6, 1e-6, 1e-6).asDiagonal();
     if (!steps_.empty()) {
@@ -228,14 +265,15 @@ private:
 };
 
 template <class Map>
-void map_log(Results& r, const cairn::CarmenLog& log, const StopMapperOptions& options,
-             const OnScan& on_scan) {
+void map_log(Results& r, const cairn::CarmenLog& log, const StopMapperOptions& options, const OnScan& on_scan,
+             std::size_t frames) {
   const auto begin = std::chrono::steady_clock::now();
   const std::clock_t cpu = std::clock();
   StopMapper<Map> mapper(log.scans.front().T_odom_laser, options);
-  for (const cairn::StampedScan& scan : log.scans) {
+  const std::size_t count = log.scans.size();
+  for (std::size_t i = 0; i < count; ++i) {
     try {
-      mapper.add(scan);
+      mapper.add(log.scans[i]);
     } catch (const std::exception& error) {
       if (mapper.scans().empty()) throw;
       end_of_data(r, log, mapper.scans().size(), error.what());
@@ -243,7 +281,10 @@ void map_log(Results& r, const cairn::CarmenLog& log, const StopMapperOptions& o
     }
     if (on_scan) r.ended_early = on_scan();
     if (r.ended_early) break;
+    if ((i + 1) * frames / count != i * frames / count && i + 1 < count)
+      r.snapshots.push_back(mapper.snapshot());
   }
+  if (frames > 0) r.snapshots.push_back(mapper.snapshot());
   r.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   r.cpu_seconds = static_cast<double>(std::clock() - cpu) / CLOCKS_PER_SEC;
   mapper.put_into(r);
@@ -265,7 +306,8 @@ StopMapperOptions matching_stops() {
 }
 
 Results run_stop_mapper(const cairn::CarmenLog& log, const StopMapperOptions& options,
-                        const std::vector<cairn::PoseRelation>& relations, const OnScan& on_scan) {
+                        const std::vector<cairn::PoseRelation>& relations, const OnScan& on_scan,
+                        std::size_t frames) {
   if (log.scans.empty()) cairn::raise("expected a log with a scan");
   if (options.draws == 0) cairn::raise("expected at least one draw a particle");
   Results r;
@@ -274,9 +316,9 @@ Results run_stop_mapper(const cairn::CarmenLog& log, const StopMapperOptions& op
   r.threads = options.threads;
   const auto map_with = [&]<class Storage>() {
     if (options.proposal == StopProposal::motion)
-      map_log<StopMap<Storage>>(r, log, options, on_scan);
+      map_log<StopMap<Storage>>(r, log, options, on_scan, frames);
     else
-      map_log<MatchedStopMap<Storage>>(r, log, options, on_scan);
+      map_log<MatchedStopMap<Storage>>(r, log, options, on_scan, frames);
   };
   if (options.storage == StopStorage::tiles)
     map_with.template operator()<cairn::SharedTiles<StopCell>>();

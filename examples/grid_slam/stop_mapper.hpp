@@ -53,9 +53,12 @@ struct StopMapperOptions {
 /// it.
 [[nodiscard]] StopMapperOptions matching_stops();
 
-/// Maps the log; the rest as run(). Throws cairn::Error on options out of range.
+/// Maps the log; the rest as run(). The covariance of the newest pose is as Mapper::newest() where scans are
+/// matched; drawn from motion it is the particles' spread, too sure wherever they have one ancestor. Throws
+/// cairn::Error on options out of range.
 [[nodiscard]] Results run_stop_mapper(const cairn::CarmenLog& log, const StopMapperOptions& options,
                                       const std::vector<cairn::PoseRelation>& relations,
-                                      const std::function<std::optional<std::string>()>& on_scan = {});
+                                      const std::function<std::optional<std::string>()>& on_scan = {},
+                                      std::size_t frames = 0);
 
 }  // namespace grid_slam

@@ -93,7 +93,7 @@ void save_map(const std::filesystem::path& path, const SavedMap& saved) {
   cairn::save_keyframe_map(out, saved.map);
   const auto keyframes = numbers_in_file(saved.map);
   for (const Landmark& landmark : saved.landmarks) put(out, landmark, keyframes);
-  cairn::write_file_atomically(path, out.file(file_kind, saved_map_version));
+  cairn::write_file_atomically(path, std::move(out).file(file_kind, saved_map_version));
 }
 
 SavedMap load_map(const std::filesystem::path& path) {

@@ -12,6 +12,8 @@
 
 #include "floor_plan.hpp"
 #include "mapper.hpp"
+#include "run.hpp"
+#include "stop_mapper.hpp"
 
 namespace newest_pose_test {
 namespace {
@@ -69,6 +71,50 @@ TEST_SUITE("grid_slam/newest_pose") {
       // What the particles alone say is far too sure: they have one ancestor.
       CHECK(by_particles > most);
     }
+  }
+
+  TEST_CASE("newest_pose: the report shows it as it is, not the particles' spread alone") {
+    CarmenLog log = simulated_drive({.seed = 2}).log;
+    log.scans.resize(280);
+    Mapper mapper({.particles = 8, .seed = 2, .threads = 2});
+    Results r = run(mapper, log, {}, {}, 4);
+    REQUIRE(r.snapshots.size() == 4);
+    CHECK(r.snapshots.back().newest == r.newest.covariance);
+    const Matrix<3> by_particles = r.steps.back().pose.covariance;
+    CHECK(r.newest.covariance(0, 0) + r.newest.covariance(1, 1) >
+          9 * (by_particles(0, 0) + by_particles(1, 1)));
+    const auto page = report(r);
+    if (!page) return;
+    for (StepRecord& step : r.steps) step.pose.covariance *= 4;
+    CHECK(report(r) == page);
+    for (Snapshot& s : r.snapshots) s.newest *= 4;
+    CHECK(report(r) != page);
+  }
+
+  TEST_CASE("newest_pose: of DP-SLAM's map with scans matched, the truth is in its spread") {
+    constexpr int drives = 5;
+    double told = 0, by_particles = 0;
+    for (std::uint64_t seed = 1; seed <= drives; ++seed) {
+      const Drive drive = simulated_drive({.seed = seed});
+      CarmenLog log = drive.log;
+      log.scans.resize(280);
+      StopMapperOptions options = matching_stops();
+      options.storage = StopStorage::tiles;
+      options.particles = 8;
+      options.seed = seed;
+      options.threads = 2;
+      const Results r = run_stop_mapper(log, options, {});
+      const SE2 truth = drive.log.scans.front().T_odom_laser *
+                        (drive.truth.front().inverse() * drive.truth[r.steps.back().scan]);
+      told += squared_distance(r.newest, truth) / drives;
+      by_particles += squared_distance(r.steps.back().pose, truth) / drives;
+    }
+    CAPTURE(told);
+    CAPTURE(by_particles);
+    const double most = chi_square_quantile(0.995, 3 * drives) / drives;
+    CHECK(told < most);
+    CHECK(told > 0.05);
+    CHECK(by_particles > most);
   }
 
   TEST_CASE("newest_pose: a closed loop takes back what the lap has gathered") {

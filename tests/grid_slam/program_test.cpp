@@ -172,6 +172,10 @@ TEST_SUITE("grid_slam/program") {
       CHECK(names_in(folder / way) == results());
       for (const char* name : {"map.pgm", "map.yaml", "trajectory.txt"})
         CHECK(cairn::read_file(folder / "stop --threads 1" / name) == cairn::read_file(folder / way / name));
+      if (!example::has_report_page()) continue;
+      const std::string page = cairn::read_file(folder / way / "report.html");
+      CHECK(page.find("Spread of the newest pose") != std::string::npos);
+      CHECK(page.find("Memory of the maps") != std::string::npos);
     }
     CHECK(cairn::read_file(folder / "ancestry --threads 1" / "summary.json") ==
           cairn::read_file(folder / "ancestry --threads 3" / "summary.json"));
@@ -214,6 +218,17 @@ TEST_SUITE("grid_slam/program") {
     }
     CHECK(cairn::read_file(folder / "map") == map);
     CHECK(run("--load " + named("map") + " --resolution 0.1" + with_log).says("cells of 0.05 m"));
+    for (const char* way : {"", " --localise"}) {  // not silently with the rendered drive
+      const Outcome without_log = run("--load " + named("map") + way + " --out " + named("none"));
+      CHECK(without_log.code == 2);
+      CHECK(without_log.says("--load goes on with a log: expected --log too, or --simulate"));
+    }
+    const Outcome wide = run("--load " + named("map") + " --localise --window -500 -500 500 500 --log " +
+                             named("log") + " --out " + named("none"));
+    CHECK(wide.code == 2);
+    CHECK(wide.says(
+        "expected a window of no more than 795 m a side, in a map of cells of 0.05 m; found 1000 m"));
+    CHECK_FALSE(fs::exists(folder / "none"));
     CHECK(run("--load " + named("torn") + with_log).says("bytes after the head, expected"));
     CHECK(run("--load " + named("map") + " --localise --window 500 500 510 510" + with_log)
               .says("outside of the map"));

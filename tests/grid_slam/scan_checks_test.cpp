@@ -62,6 +62,15 @@ TEST_SUITE("grid_slam/scan_checks") {
     CHECK_FALSE(has_hit_from(codes, 4));
   }
 
+  TEST_CASE("grid_slam: readings that are all 0 are invalid, not no return") {
+    cairn::CarmenLog log = drive_with([](float) { return 0.0F; });
+    const double farthest = log.scans[0].scan.farthest;
+    const std::vector<std::string> notes = check_scans(log, "log");
+    REQUIRE(notes.size() == 1);
+    CHECK(notes[0].find("no reading is as much as 0.05 m: all are invalid") == 0);
+    CHECK(log.scans[0].scan.farthest == farthest);
+  }
+
   TEST_CASE("grid_slam: scans of a scanner that sees far enough stay what they are") {
     cairn::CarmenLog log = drive_with([](float r) { return r; });
     const double farthest = log.scans[0].scan.farthest;

@@ -72,13 +72,18 @@ public:
   }
 
   /// The whole file. `kind` has eight letters.
-  [[nodiscard]] std::string file(std::string_view kind, std::uint64_t version) const {
+  [[nodiscard]] std::string file(std::string_view kind, std::uint64_t version) const& {
+    return BinaryWriter(*this).file(kind, version);
+  }
+  /// The same of a writer that is not needed any more: the numbers are there but once.
+  [[nodiscard]] std::string file(std::string_view kind, std::uint64_t version) && {
     CAIRN_EXPECTS(kind.size() == 8, "BinaryWriter: a kind of file is named by eight letters");
     BinaryWriter head;
     head.put(version);
     head.put(std::uint64_t{numbers_.size()});
     head.put(detail::binary_checksum(head.numbers_, numbers_));
-    return std::string(kind) + head.numbers_ + numbers_;
+    numbers_.insert(0, std::string(kind) + head.numbers_);
+    return std::move(numbers_);
   }
 
 private:

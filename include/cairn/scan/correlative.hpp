@@ -35,10 +35,11 @@ namespace cairn { inline namespace CAIRN_ABI {
 /// What a point is worth in each cell of a rectangle, 0 to 255; 0 outside.
 class ScoreGrid {
 public:
+  static constexpr int most = 1 << 14;  ///< columns, and rows
+
   /// `columns` x `rows` cells from `corner` on, all 0. Throws Error on bad sizes.
   ScoreGrid(const GridGeometry& geometry, CellAddress corner, int columns, int rows)
       : geometry_(geometry), corner_(corner), columns_(columns), rows_(rows) {
-    constexpr int most = 1 << 14;
     if (columns < 1 || rows < 1 || columns > most || rows > most)
       raise("ScoreGrid: expected 1 to 16384 columns and rows, found " + std::to_string(columns) + " x " +
             std::to_string(rows));
