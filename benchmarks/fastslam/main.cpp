@@ -46,10 +46,6 @@ using cairn::Vector;
 // Settings were looked for with the seeds 1 to 5, which then flatter: these are others.
 constexpr std::uint64_t first_seed = 101, seeds = 5;
 
-double median(std::vector<double> values) {
-  std::ranges::sort(values);
-  return values[values.size() / 2];
-}
 std::string worst(const std::vector<double>& values) {
   return "worst of 5 seeds " + std::to_string(*std::ranges::max_element(values));
 }
@@ -118,14 +114,14 @@ void add_robots(Scoreboard& board) {
       path.rival_name = "EKF-SLAM, its online path";
       log.withhold_identities();
       const Runs withheld = runs_of(log, 100);
-      path.measured = median(known.path);
+      path.measured = cairn::median(known.path);
       path.note = worst(known.path);
-      landmarks.measured = median(known.landmarks);
+      landmarks.measured = cairn::median(known.landmarks);
       landmarks.note = worst(known.landmarks);
-      ratio.measured = median(withheld.path) / median(known.path);
+      ratio.measured = cairn::median(withheld.path) / cairn::median(known.path);
       ratio.note = worst(withheld.path) + " m";
-      nees.measured = median(known.nees);
-      nees.note = worst(known.nees) + "; withheld, M = 100: " + std::to_string(median(withheld.nees));
+      nees.measured = cairn::median(known.nees);
+      nees.note = worst(known.nees) + "; withheld, M = 100: " + std::to_string(cairn::median(withheld.nees));
     } else {
       path.note = landmarks.note = ratio.note = nees.note = "no data";
     }
@@ -156,11 +152,11 @@ void add_park(Scoreboard& board) {
     };
     std::vector<double> seconds, ignored;
     const std::vector<double> fifty = errors(50, seconds), ten = errors(10, ignored);
-    error.measured = median(fifty);
+    error.measured = cairn::median(fifty);
     error.note = "after a rigid fit; " + worst(fifty);
-    few.measured = median(ten);
+    few.measured = cairn::median(ten);
     few.note = worst(ten);
-    time.measured = median(seconds);
+    time.measured = cairn::median(seconds);
     const EkfSlamRun ekf = ekf_slam(log);
     std::vector<Vector<2>> path;
     for (const auto& pose : ekf.poses) path.push_back(pose.mean.translation());
@@ -254,8 +250,8 @@ UpdateCost update_cost(std::uint32_t landmarks, double off) {
     }
     plain_times.push_back(1e3 * std::chrono::duration<double>(Clock::now() - begin).count());
   }
-  cost.milliseconds = median(times);
-  cost.plain_milliseconds = median(plain_times);
+  cost.milliseconds = cairn::median(times);
+  cost.plain_milliseconds = cairn::median(plain_times);
   return cost;
 }
 
@@ -325,7 +321,7 @@ IndexCost index_cost(std::uint32_t landmarks) {
     cost.bytes = static_cast<double>(after.uordblks + after.hblkhd - before.uordblks - before.hblkhd) /
                  static_cast<double>(particles);
   }
-  cost.microseconds = median(times);
+  cost.microseconds = cairn::median(times);
   return cost;
 }
 

@@ -11,6 +11,8 @@
 #include <thread>
 #include <vector>
 
+#include <cairn/core/statistics.hpp>
+
 #include "drive.hpp"
 #include "run.hpp"
 #include "support/scoreboard.hpp"
@@ -44,11 +46,6 @@ Runs runs_of(Cells cells, std::uint64_t seeds) {
   return runs;
 }
 
-double median(std::vector<double> values) {
-  std::ranges::sort(values);
-  return values[values.size() / 2];
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -56,20 +53,20 @@ int main(int argc, char** argv) {
   Scoreboard board("gamma_slam");
   const Runs runs = runs_of(Cells::heights, 5);
   board.add({.name = "error over visual odometry's, median of 5 seeds",
-             .measured = median(runs.share),
+             .measured = cairn::median(runs.share),
              .unit = "",
              .must = 1.0 / 3,
              .aim = 1.0 / 8,
              .rival_name = "visual odometry is 1",
-             .note = "errors " + std::to_string(median(runs.error)) + " and " +
-                     std::to_string(median(runs.odometry)) + " m"});
+             .note = "errors " + std::to_string(cairn::median(runs.error)) + " and " +
+                     std::to_string(cairn::median(runs.odometry)) + " m"});
   board.add({.name = "the same, worst seed",
              .measured = *std::ranges::max_element(runs.share),
              .unit = "",
              .must = 1.0 / 3,
              .rival_name = "no rival"});
   // One number for a band: how far from 90 %.
-  const double covered = median(runs.covered);
+  const double covered = cairn::median(runs.covered);
   board.add({.name = "cells whose 90 % interval of sigma holds: distance of the share from 90 %",
              .measured = std::abs(covered - 90),
              .unit = "%",
@@ -79,7 +76,7 @@ int main(int argc, char** argv) {
              .note = std::to_string(covered) + " %, lowest " +
                      std::to_string(*std::ranges::min_element(runs.covered)) + " %"});
   board.add({.name = "a scan, 100 particles",
-             .measured = median(runs.milliseconds),
+             .measured = cairn::median(runs.milliseconds),
              .unit = "ms",
              .rival_name = "no rival"});
   const Runs variance = runs_of(Cells::variance, 1);

@@ -67,14 +67,6 @@ struct Runs {
   double worst_milliseconds = 0;  // of all processed scans
 };
 
-double quantile(std::vector<double> values, double share) {
-  std::ranges::sort(values);
-  return values[std::min(values.size() - 1,
-                         static_cast<std::size_t>(share * static_cast<double>(values.size())))];
-}
-double median(const std::vector<double>& values) {
-  return quantile(values, 0.5);
-}
 double worst(const std::vector<double>& values) {
   return *std::ranges::max_element(values);
 }
@@ -93,7 +85,7 @@ Runs runs_of(const cairn::CarmenLog& log, const std::vector<cairn::PoseRelation>
     std::vector<double> scans;  // CPU of the processed ones [ms]
     for (const grid_slam::StepRecord& step : r.steps)
       scans.push_back(1e3 * static_cast<double>(ends[step.scan + 1] - ends[step.scan]) / CLOCKS_PER_SEC);
-    runs.pause.push_back(worst(scans) / median(scans));
+    runs.pause.push_back(worst(scans) / cairn::median(scans));
     runs.worst_milliseconds = std::max(runs.worst_milliseconds, worst(scans));
     runs.mean.push_back(r.of_means->mean);
     runs.angle.push_back(r.of_means->mean_angle * degrees);
@@ -104,8 +96,8 @@ Runs runs_of(const cairn::CarmenLog& log, const std::vector<cairn::PoseRelation>
     runs.megabytes.push_back(static_cast<double>(usage.ru_maxrss) / 1024);
     std::cerr << "seed " << seed << ": " << runs.mean.back() << " m, rematched " << r.of_rematched->mean
               << " m, largest " << runs.largest.back() << " m; a processed scan's CPU: median "
-              << median(scans) << " ms, 99 % below " << quantile(scans, 0.99) << " ms, worst " << worst(scans)
-              << " ms\n";
+              << cairn::median(scans) << " ms, 99 % below " << cairn::quantile(scans, 0.99) << " ms, worst "
+              << worst(scans) << " ms\n";
   }
   return runs;
 }
@@ -145,12 +137,13 @@ void add_rival_rows(Scoreboard& board, const std::string& title, const std::vect
   for (const RivalRuns& r : rivals)
     board.add({.name = title + " by " + r.name + ", its defaults: mean of relations, median of " +
                        std::to_string(r.mean.size()),
-               .measured = median(r.mean),
+               .measured = cairn::median(r.mean),
                .unit = "m",
                .rival_name = "a rival's own row",
-               .note = "worst " + std::to_string(worst(r.mean)) + " m, " + std::to_string(median(r.angle)) +
-                       " deg, largest " + std::to_string(worst(r.largest)) + " m, CPU " +
-                       std::to_string(median(r.milliseconds)) + " ms a processed scan"});
+               .note = "worst " + std::to_string(worst(r.mean)) + " m, " +
+                       std::to_string(cairn::median(r.angle)) + " deg, largest " +
+                       std::to_string(worst(r.largest)) + " m, CPU " +
+                       std::to_string(cairn::median(r.milliseconds)) + " ms a processed scan"});
 }
 
 void add_rows(Scoreboard& board, const Figures& f, const std::optional<std::filesystem::path>& folder) {
@@ -172,7 +165,7 @@ void add_rows(Scoreboard& board, const Figures& f, const std::optional<std::file
     return r;
   };
   Row mean = row("mean of relations, median of 5 seeds", "m", f.must, f.aim,
-                 [](const Runs& r) { return median(r.mean); });
+                 [](const Runs& r) { return cairn::median(r.mean); });
   mean.rival = f.rival;
   mean.rival_name = f.rival_name;
   board.add(mean);
@@ -180,18 +173,18 @@ void add_rows(Scoreboard& board, const Figures& f, const std::optional<std::file
   board.add(row("the same, worst seed", "m", f.log == "aces" ? std::optional(0.055) : std::nullopt, {},
                 [](const Runs& r) { return worst(r.mean); }));
   board.add(row("mean angle, median", "deg", f.must_angle, f.aim_angle,
-                [](const Runs& r) { return median(r.angle); }));
+                [](const Runs& r) { return cairn::median(r.angle); }));
   board.add(row("largest relation, worst seed", "m", f.log == "intel" ? std::nullopt : std::optional(0.5), {},
                 [](const Runs& r) { return worst(r.largest); }));
   if (f.log != "aces") return;
   // Of the rivals what issue 17 and its specification give, measured on another machine: their own rows are
   // of this one.
   Row cpu = row("CPU a processed scan, 30 particles", "ms", 13, 4,
-                [](const Runs& r) { return median(r.milliseconds); });
+                [](const Runs& r) { return cairn::median(r.milliseconds); });
   cpu.rival_name = "as published: open_karto 15-36 and growing, GMapping 64-74";
   board.add(cpu);
   Row pause = row("the worst processed scan's CPU over the median one's, median of 5 seeds", "times", 5, 3,
-                  [](const Runs& r) { return median(r.pause); });
+                  [](const Runs& r) { return cairn::median(r.pause); });
   if (runs)
     pause.note = "at a loop that moves the paths; worst " + std::to_string(runs->worst_milliseconds) + " ms";
   board.add(pause);
@@ -250,7 +243,7 @@ void add_stop_rows(Scoreboard& board) {
       means.push_back(grid_slam::run_stop_mapper(*log, options, relations).of_means->mean);
       std::cerr << "DP-SLAM's map, seed " << seed << ": " << means.back() << " m\n";
     }
-    aces.measured = median(means);
+    aces.measured = cairn::median(means);
     aces.note = "worst " + std::to_string(worst(means)) + " m";
   } else {
     aces.note = "no data";

@@ -140,9 +140,8 @@ void add_map(example::Report& page, const Results& r) {
     plot.caption +=
         " GPS, which was not used, is moved rigidly onto the path: half of its fixes are within " +
         readable(*r.gps_median) +
-        " m of the part of it where the wheels had turned as far. The receiver jumps, and was out for a part "
-        "of "
-        "the way.";
+        " m of the part of it where the wheels had turned as far. The receiver jumps, and was out for "
+        "a part of the way.";
   }
   plot.curves.push_back(curve_of("path", Ink::belief, places_of(r.mean), T));
   if (!r.true_landmarks.empty())

@@ -216,13 +216,11 @@ void add_spread(example::Report& page, const Results& r) {
     turn.push_back(std::sqrt(s.newest(2, 2)) * degrees);
   }
   const std::string path =
-      "Standard deviation of the newest pose, seen from where the map begins: of the particles' spread and "
-      "of "
-      "what the best one's path has gathered step by step, less what loops have told of it.";
+      "Standard deviation of the newest pose, seen from where the map begins: of the particles' spread "
+      "and of what the best one's path has gathered step by step, less what loops have told of it.";
   const std::string particles =
-      "Standard deviation of the newest pose over all particles. It does not hold what they all have in "
-      "common, "
-      "as the steps of a common ancestor.";
+      "Standard deviation of the newest pose over all particles. It does not hold what they all have "
+      "in common, as the steps of a common ancestor.";
   page.add(
       example::LinePlot{.title = "Spread of the newest pose",
                         .caption = r.newest_has_path ? path : particles,

@@ -71,8 +71,7 @@ Results run(Mapper& mapper, const cairn::CarmenLog& log, const std::vector<cairn
     }
     if (on_scan) r.ended_early = on_scan();
     if (r.ended_early) break;
-    if ((i + 1) * frames / count != i * frames / count && i + 1 < count)
-      r.snapshots.push_back(snapshot_of(mapper));
+    if (is_film_frame(i, count, frames)) r.snapshots.push_back(snapshot_of(mapper));
   }
   if (frames > 0 && !mapper.scans().empty()) r.snapshots.push_back(snapshot_of(mapper));
   r.scans = mapper.scans().size();

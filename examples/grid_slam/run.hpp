@@ -31,6 +31,11 @@ namespace grid_slam {
                           const std::vector<cairn::PoseRelation>& relations,
                           const std::function<std::optional<std::string>()>& on_scan = {});
 
+/// Whether a snapshot is due after scan i of so many, where `frames` are spread over the log: the last of
+/// them is of its end, which comes when the log or the run ends.
+[[nodiscard]] constexpr bool is_film_frame(std::size_t i, std::size_t count, std::size_t frames) noexcept {
+  return (i + 1) * frames / count != i * frames / count && i + 1 < count;
+}
 /// Ends a run at scan `next` of the log, which could not be mapped, and says which that is.
 void end_of_data(Results& results, const cairn::CarmenLog& log, std::size_t next, const std::string& why);
 /// What a reader of the results should know: a map without a picture, scans without beams.

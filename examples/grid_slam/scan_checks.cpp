@@ -244,9 +244,8 @@ std::optional<std::string> without_unconfirmed(cairn::CarmenLog& log) {
   for (std::size_t k = 0; k < log.scans.size(); ++k)
     for (const std::size_t beam : alone[k]) log.scans[k].scan.range[beam] = 0;
   return cairn::shortest(std::round(100 * count / hits)) +
-         " % of the readings are met in no beam beside and in no scan before or after (dust, rain, a "
-         "sensor's "
-         "errors): they are left out";
+         " % of the readings are met in no beam beside and in no scan before or after (dust, rain, "
+         "a sensor's errors): they are left out";
 }
 
 }  // namespace

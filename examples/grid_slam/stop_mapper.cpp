@@ -175,14 +175,13 @@ public:
     r.scans = scans_.size();
     for (const auto& scan : scans_) r.odometry.push_back({scan.time, scan.T_odom_laser});
     const auto path = belief_.path(belief_.best());
-    r.drawn = filled_path(
-        scans_, steps_.size(), [&](std::size_t k) { return steps_[k].scan; },
-        [&](std::size_t k) { return path[k + 1].pose; });
+    const auto filled = [&](const auto& pose) {
+      return filled_path(scans_, steps_.size(), [&](std::size_t k) { return steps_[k].scan; }, pose);
+    };
+    r.drawn = filled([&](std::size_t k) { return path[k + 1].pose; });
     // The mean of what was drawn from is an estimate where that knew of the scan, and none where it did not.
-    r.means = !scans_are_matched() ? r.drawn
-                                   : filled_path(
-                                         scans_, steps_.size(), [&](std::size_t k) { return steps_[k].scan; },
-                                         [&](std::size_t k) { return path[k + 1].drawn_from.mean; });
+    r.means =
+        scans_are_matched() ? filled([&](std::size_t k) { return path[k + 1].drawn_from.mean; }) : r.drawn;
     r.rematched = r.means;
     r.newest = newest();
     r.newest_has_path = scans_are_matched();
@@ -281,8 +280,7 @@ void map_log(Results& r, const cairn::CarmenLog& log, const StopMapperOptions& o
     }
     if (on_scan) r.ended_early = on_scan();
     if (r.ended_early) break;
-    if ((i + 1) * frames / count != i * frames / count && i + 1 < count)
-      r.snapshots.push_back(mapper.snapshot());
+    if (is_film_frame(i, count, frames)) r.snapshots.push_back(mapper.snapshot());
   }
   if (frames > 0) r.snapshots.push_back(mapper.snapshot());
   r.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -46,11 +46,26 @@ double squared_distance(const Gaussian<SE2>& pose, const SE2& truth) {
   return root.whiten(local(pose.mean, truth)).squaredNorm();
 }
 
+constexpr int drives = 5;
+
+/// Of means of as many squared distances, from the pose that is told and from that of the particles alone.
+void expect_spread(double told, double by_particles) {
+  CAPTURE(told);
+  CAPTURE(by_particles);
+  // The mean of five chi-squares of three degrees of freedom is below this 995 times of 1000. It is below 1,
+  // for the steps' errors are not as independent as they are taken to be: each is matched to the map that the
+  // ones before have made.
+  const double most = chi_square_quantile(0.995, 3 * drives) / drives;
+  CHECK(told < most);
+  CHECK(told > 0.05);
+  // What the particles alone say is far too sure: they have one ancestor.
+  CHECK(by_particles > most);
+}
+
 }  // namespace
 
 TEST_SUITE("grid_slam/newest_pose") {
   TEST_CASE("newest_pose: the truth is in its spread, whether scans are in time or late") {
-    constexpr int drives = 5;
     for (const std::size_t late : {std::size_t{0}, std::size_t{1}}) {
       CAPTURE(late);
       double told = 0, by_particles = 0;
@@ -60,16 +75,7 @@ TEST_SUITE("grid_slam/newest_pose") {
         told += squared_distance(d.mapper.newest(), d.truth) / drives;
         by_particles += squared_distance(d.mapper.belief().pose(), d.truth) / drives;
       }
-      CAPTURE(told);
-      CAPTURE(by_particles);
-      // The mean of five chi-squares of three degrees of freedom is below this 995 times of 1000. It is
-      // below 1, for the steps' errors are not as independent as they are taken to be: each is matched to
-      // the map that the ones before have made.
-      const double most = chi_square_quantile(0.995, 3 * drives) / drives;
-      CHECK(told < most);
-      CHECK(told > 0.05);
-      // What the particles alone say is far too sure: they have one ancestor.
-      CHECK(by_particles > most);
+      expect_spread(told, by_particles);
     }
   }
 
@@ -92,7 +98,6 @@ TEST_SUITE("grid_slam/newest_pose") {
   }
 
   TEST_CASE("newest_pose: of DP-SLAM's map with scans matched, the truth is in its spread") {
-    constexpr int drives = 5;
     double told = 0, by_particles = 0;
     for (std::uint64_t seed = 1; seed <= drives; ++seed) {
       const Drive drive = simulated_drive({.seed = seed});
@@ -109,12 +114,7 @@ TEST_SUITE("grid_slam/newest_pose") {
       told += squared_distance(r.newest, truth) / drives;
       by_particles += squared_distance(r.steps.back().pose, truth) / drives;
     }
-    CAPTURE(told);
-    CAPTURE(by_particles);
-    const double most = chi_square_quantile(0.995, 3 * drives) / drives;
-    CHECK(told < most);
-    CHECK(told > 0.05);
-    CHECK(by_particles > most);
+    expect_spread(told, by_particles);
   }
 
   TEST_CASE("newest_pose: a closed loop takes back what the lap has gathered") {
