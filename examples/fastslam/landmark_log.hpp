@@ -6,6 +6,7 @@
 /// known.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -64,6 +65,15 @@ struct LandmarkLog {
     if (frames.size() <= count) return;
     frames.resize(count);
     std::erase_if(between, [&](const Between& pose) { return pose.frame + 1 >= count; });
+  }
+
+  /// Whether any sighting of the first frames says which landmark it is of.
+  [[nodiscard]] bool has_identities(std::size_t first) const {
+    return std::any_of(frames.begin(), frames.begin() + static_cast<std::ptrdiff_t>(first),
+                       [](const Frame& f) {
+                         return std::ranges::any_of(
+                             f.seen, [](const auto& sighting) { return sighting.identity.has_value(); });
+                       });
   }
 
   /// Forgets which landmarks were seen.

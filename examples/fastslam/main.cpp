@@ -10,18 +10,22 @@
 #include <iostream>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <thread>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 
 #include <cairn/core/check.hpp>
 
 #include "landmark_log.hpp"
+#include "mapper.hpp"
 #include "outputs.hpp"
 #include "slam.hpp"
 #include "support/command_line.hpp"
 #include "support/interruption.hpp"
 #include "support/progress.hpp"
+#include "support/result_folder.hpp"
 
 namespace {
 
@@ -32,12 +36,15 @@ struct Options {
               association = "drawn";
   int robot = 1;
   std::optional<std::size_t> frames;
-  std::filesystem::path out = "fastslam_out";
+  std::filesystem::path out = "fastslam_out", save, load;
   SlamOptions slam{.threads = std::max(1U, std::thread::hardware_concurrency())};
 };
 
-std::filesystem::path data_folder(const Options& options, const char* name) {
+std::filesystem::path folder_of(const Options& options) {
   if (!options.folder.empty()) return options.folder;
+  const char* const name = options.data == "mrclam"          ? "mrclam_7"
+                           : options.data == "victoria_park" ? "victoria_park"
+                                                             : "fastslam_maps";
   const char* root = std::getenv("CAIRN_DATA");
   if (root == nullptr)
     cairn::raise("--data " + options.data +
@@ -45,11 +52,18 @@ std::filesystem::path data_folder(const Options& options, const char* name) {
   return std::filesystem::path(root) / name;
 }
 
+std::vector<std::filesystem::path> files_in(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> files;
+  std::error_code none;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, none)) files.push_back(entry.path());
+  return files;
+}
+
 LandmarkLog log_of(const Options& options) {
   const std::size_t simulated_frames = options.frames.value_or(500);
-  if (options.data == "mrclam") return read_mrclam(data_folder(options, "mrclam_7"), options.robot);
+  if (options.data == "mrclam") return read_mrclam(folder_of(options), options.robot);
   if (options.data == "victoria_park") {
-    const std::filesystem::path folder = data_folder(options, "victoria_park");
+    const std::filesystem::path folder = folder_of(options);
     LandmarkLog log = read_graph(folder / "victoria_park_graph.txt");
     const std::filesystem::path fixes = folder / "aa3_gpsx.mat", wheels = folder / "aa3_dr.mat";
     if (std::filesystem::exists(fixes) && std::filesystem::exists(wheels)) read_gps(log, fixes, wheels);
@@ -58,16 +72,23 @@ LandmarkLog log_of(const Options& options) {
   if (options.data == "map") {
     if (options.name.empty())
       cairn::raise("--data map: expected the name of a map as --name: example_webmap, say");
-    const PointMap map = read_point_map(data_folder(options, "fastslam_maps") / (options.name + ".mat"));
+    const PointMap map = read_point_map(folder_of(options) / (options.name + ".mat"));
     return simulated(map, options.slam.seed, simulated_frames);
   }
   return simulated(loop_map(), options.slam.seed, simulated_frames);
 }
 
-Results run_with_progress(const LandmarkLog& log, const SlamOptions& options) {
+LandmarkLog read_log(const Options& options) {
+  LandmarkLog log = log_of(options);
+  if (options.frames) log.keep_first(*options.frames);
+  if (options.identities == "withheld") log.withhold_identities();
+  return log;
+}
+
+Results run_with_progress(Mapper& mapper) {
   const example::Interruption interruption;
-  example::Progress progress(std::clog, "frames", log.frames.size());
-  return run(log, options, [&]() -> std::optional<std::string> {
+  example::Progress progress(std::clog, "frames", mapper.log().frames.size() - mapper.steps().size());
+  return run(mapper, [&]() -> std::optional<std::string> {
     progress.step();
     if (const auto signal = example::Interruption::caught())
       return "interrupted (" + *signal + ") after " + std::to_string(progress.done()) + " frames";
@@ -117,6 +138,11 @@ void add_options(CLI::App& app, Options& o) {
   app.add_option("--seed", o.slam.seed, "the same seed gives the same results for any number of threads")
       ->check(example::whole_number(0));
   app.add_option("--threads", o.slam.threads, "threads")->check(example::whole_number(1, 1024));
+  app.add_option("--save", o.save, "a file for the map and all that going on with it needs")
+      ->default_str("none");
+  app.add_option("--load", o.load,
+                 "a map to go on with: the log begins with the frames that it was made of, and has more")
+      ->default_str("none");
 }
 
 /// Throws where an option was given that would do nothing.
@@ -128,6 +154,9 @@ void expect_use_of_all(const CLI::App& app, const Options& o) {
   if (o.identities == "known") expect_absent(app, {"--association"}, "for --identities withheld");
   if (o.proposal == "motion" && o.slam.redraw_below > 0)
     expect_absent(app, {"--redraw"}, "for --proposal landmarks");
+  if (!o.load.empty())
+    expect_absent(app, {"--particles", "--seed", "--proposal", "--association", "--redraw"},
+                  "for a map that begins: a loaded one has its own");
 }
 
 }  // namespace
@@ -141,16 +170,22 @@ int main(int argc, char** argv) {
   if (const std::optional<int> code = example::parse(app, name, argc, argv)) return *code;
   return example::exit_code_of(name, [&]() -> int {
     expect_use_of_all(app, options);
-    LandmarkLog log = log_of(options);
-    if (options.frames) log.keep_first(*options.frames);
-    if (options.identities == "withheld") log.withhold_identities();
+    if (options.data != "loop") example::expect_not_read(options.save, files_in(folder_of(options)));
     options.slam.proposal = options.proposal == "motion" ? ProposalKind::motion : ProposalKind::landmarks;
     options.slam.landmarks.pick =
         options.association == "drawn" ? cairn::Pick::drawn : cairn::Pick::likeliest;
-    prepare_folder(options.out);
-    const Results results = run_with_progress(log, options.slam);
+    if (!options.load.empty()) options.slam.seed = saved_options(options.load).seed;  // of a simulated drive
+    const LandmarkLog log = read_log(options);
+    Mapper mapper = options.load.empty() ? Mapper(log, options.slam)
+                                         : Mapper::loaded(options.load, log, options.slam.threads);
+    if (!options.load.empty() && !mapper.has_next())
+      cairn::raise(options.load.string() + ": the map is of all " + std::to_string(log.frames.size()) +
+                   " frames of the log: expected more to go on with (--frames)");
+    prepare_folder(options.out, {options.save});
+    const Results results = run_with_progress(mapper);
     if (results.ended_early) std::cerr << name << ": " << *results.ended_early << '\n';
     if (const auto no_report = write_outputs(results, options.out)) std::cout << *no_report << '\n';
+    if (!options.save.empty()) mapper.save(options.save);
     print(results, options.out);
     return results.ended_early ? example::exit_interrupted : example::exit_well;
   });

@@ -64,8 +64,10 @@ Names weighed(const LandmarkLog& log, const std::vector<SE2>& start,
   return weighed(log, part, batch_optimum(part, start), std::move(associations), empty);
 }
 
-OtherNames::OtherNames(const LandmarkLog& log, const SlamOptions& options)
-    : log_(log), options_(options), empty_(log.sensor, options.landmarks) {}
+OtherNames::OtherNames(const LandmarkLog& log, const SlamOptions& options) : OtherNames(log, options, {}) {}
+
+OtherNames::OtherNames(const LandmarkLog& log, const SlamOptions& options, std::vector<Reading> kept)
+    : log_(log), options_(options), empty_(log.sensor, options.landmarks), kept_(std::move(kept)) {}
 
 std::optional<Names> OtherNames::much_likelier(const Names& names) {
   constexpr double margin = 25;

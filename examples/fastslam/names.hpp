@@ -43,14 +43,18 @@ struct Names {
 /// twenty landmarks of fifteen; for ten, one in ten was led astray.
 class OtherNames {
 public:
-  /// Both have to outlive it.
+  /// The log has to outlive it.
   OtherNames(const LandmarkLog& log, const SlamOptions& options);
+  /// One that goes on with what another kept().
+  OtherNames(const LandmarkLog& log, const SlamOptions& options, std::vector<Reading> kept);
 
   /// Much likelier names of as many frames than these, which are the likeliest of the particles'; nothing
   /// where there are none. To be asked of ever more frames. O(frames log landmarks) for each move over a gap,
   /// and up to seven sparse least squares for each of some forty readings. The same for any number of
   /// threads.
   [[nodiscard]] std::optional<Names> much_likelier(const Names& names);
+
+  [[nodiscard]] const std::vector<Reading>& kept() const noexcept { return kept_; }
 
 private:
   [[nodiscard]] std::vector<Names> solved(std::vector<Reading> readings) const;
@@ -60,7 +64,7 @@ private:
   [[nodiscard]] std::vector<Reading> next_to(const Names& names) const;
 
   const LandmarkLog& log_;
-  const SlamOptions& options_;
+  SlamOptions options_;
   Map empty_;
   std::vector<Reading> kept_;
 };

@@ -281,8 +281,8 @@ std::optional<std::string> report(const Results& r) {
   return page.html();
 }
 
-void prepare_folder(const std::filesystem::path& folder) {
-  results_in(folder).prepare();
+void prepare_folder(const std::filesystem::path& folder, const std::vector<std::filesystem::path>& besides) {
+  results_in(folder).prepare(besides);
 }
 
 std::optional<std::string> write_outputs(const Results& r, const std::filesystem::path& folder) {

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "slam.hpp"
 
@@ -18,8 +19,10 @@ namespace fastslam {
 [[nodiscard]] std::string summary(const Results& results);
 [[nodiscard]] std::optional<std::string> report(const Results& results);
 
-/// Makes the folder where it is missing and checks that a file can be written. Throws cairn::Error.
-void prepare_folder(const std::filesystem::path& folder);
+/// Makes the folder where it is missing and checks that a file can be written, and `besides`, if they have
+/// names, beside the results. Throws cairn::Error.
+void prepare_folder(const std::filesystem::path& folder,
+                    const std::vector<std::filesystem::path>& besides = {});
 
 /// Writes all files or, throwing cairn::Error, none. Returns why there is no report, where there is none.
 [[nodiscard]] std::optional<std::string> write_outputs(const Results& results,

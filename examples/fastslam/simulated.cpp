@@ -70,6 +70,7 @@ PointMap read_point_map(const std::filesystem::path& path) {
   };
   map.landmarks = head("lm");
   map.way = head("wp");
+  if (map.way.size() < 2) lines.fail("a way of at least two points");
   return map;
 }
 

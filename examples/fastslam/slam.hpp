@@ -103,10 +103,16 @@ struct Results {
   double seconds = 0, cpu_seconds = 0;
 };
 
-/// Maps the log. `on_frame` is called after every frame; what it returns, if anything, ends the run and says
-/// why. Throws cairn::Error where the log cannot be mapped.
-[[nodiscard]] Results run(const LandmarkLog& log, const SlamOptions& options,
-                          const std::function<std::optional<std::string>()>& on_frame = {});
+/// Called after every frame; what it returns, if anything, ends the run and says why.
+using OnFrame = std::function<std::optional<std::string>()>;
+
+/// Maps the log. Throws cairn::Error where the log cannot be mapped.
+[[nodiscard]] Results run(const LandmarkLog& log, const SlamOptions& options, const OnFrame& on_frame = {});
+
+class Mapper;
+/// The same with what a mapper has left of its log. It can then go on with a longer one, as though that had
+/// been its log from the first.
+[[nodiscard]] Results run(Mapper& mapper, const OnFrame& on_frame = {});
 
 /// A pose for every frame and between them: along odometry, what that is short of the next frame's spread
 /// over the way. `poses` are of the first frames of the log.

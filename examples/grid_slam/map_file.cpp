@@ -22,8 +22,9 @@
 #include <cairn/io/file.hpp>
 #include <cairn/io/text.hpp>
 
-#include "archive.hpp"
 #include "mapper.hpp"
+#include "support/archive.hpp"
+#include "support/paths_archive.hpp"
 
 namespace cairn {
 inline namespace CAIRN_ABI {
@@ -40,19 +41,6 @@ void parts(Archive& archive, StampedScan& s) {
 template <class Archive>
 void parts(Archive& archive, ScanPoint& p) {
   archive(p.x, p.y);
-}
-template <class Archive>
-void parts(Archive& archive, PathsRecord<SE2>::Node& n) {
-  auto& q = n.pose.drawn_from;
-  archive(n.pose.pose, q.mean, q.covariance, n.pose.before, n.pose.drawn, n.pose.step, n.parent);
-}
-template <class Archive>
-void parts(Archive& archive, PathsRecord<SE2>::Particle& p) {
-  archive(p.node, p.log_evidence, p.log_weight, p.regime);
-}
-template <class Archive>
-void parts(Archive& archive, PathsRecord<SE2>& r) {
-  archive(r.nodes, r.particles, r.step);
 }
 template <class Archive>
 void parts(Archive& archive, OccupancyCell& c) {
@@ -72,9 +60,14 @@ void parts(Archive& archive, EndPointModel& m) {
 
 namespace grid_slam {
 
+using example::expect_covariance;
+using example::expect_place;
+using example::Reader;
+using example::Writer;
+
 template <class Archive>
 void parts(Archive& archive, StepRecord& s) {
-  archive(s.scan, s.effective_size, s.resampled, s.moved, s.pose.mean, s.pose.covariance);
+  archive(s.scan, s.effective_size, s.resampled, s.moved, s.pose);
 }
 template <class Archive>
 void parts(Archive& archive, Loop& l) {
@@ -167,41 +160,6 @@ private:
   std::map<const void*, std::uint32_t> known_;  // looked up only; its order decides nothing
 };
 
-/// As the reader of logs has it: sums and products of such places are numbers.
-void expect_place(const Reader& reader, const cairn::SE2& pose) {
-  if (!(std::abs(pose.x()) <= cairn::farthest_odometry && std::abs(pose.y()) <= cairn::farthest_odometry))
-    reader.refuse("a pose lies more than 1e9 m away");
-}
-
-void expect_covariance(const Reader& reader, const cairn::Matrix<3>& covariance) {
-  try {
-    static_cast<void>(cairn::Gaussian<cairn::SE2>::checked(cairn::SE2(), covariance));
-  } catch (const cairn::Error& error) {
-    reader.refuse(error.what());
-  }
-}
-
-/// A path of `poses` for every particle, each pose with its place on it; parents before their children.
-void expect_paths(const Reader& reader, const cairn::PathsRecord<cairn::SE2>& record, std::size_t poses) {
-  std::vector<std::uint64_t> length;
-  for (const auto& node : record.nodes) {
-    const bool first = node.parent == std::numeric_limits<std::uint32_t>::max();
-    if (!first && node.parent >= length.size()) reader.refuse("a pose comes before the one it follows");
-    length.push_back(first ? 1 : length[node.parent] + 1);
-    if (node.pose.step + 1 != length.back()) reader.refuse("a pose is not where it stands on its path");
-    for (const cairn::SE2& pose :
-         {node.pose.pose, node.pose.before, node.pose.drawn, node.pose.drawn_from.mean})
-      expect_place(reader, pose);
-    expect_covariance(reader, node.pose.drawn_from.covariance);
-  }
-  for (const auto& particle : record.particles) {
-    if (particle.node >= length.size() || length[particle.node] != poses)
-      reader.refuse("a particle's path is not as long as the map's");
-    if (particle.regime > 1) reader.refuse("a particle drives neither forwards nor backwards");
-  }
-  if (record.step + 1 != poses) reader.refuse("the steps are not as many as those of the paths");
-}
-
 bool growing(const std::vector<double>& numbers) {
   return std::ranges::is_sorted(numbers) && (numbers.empty() || numbers.front() >= 0);
 }
@@ -291,7 +249,8 @@ Mapper Mapper::loaded(Reader& reader, const MapRequest& wanted) {
   reader.expect_end();
   if (record.particles.size() != options.particles) reader.refuse("the map has other particles than it says");
   mapper.expect_sound(reader);
-  expect_paths(reader, record, mapper.travelled_.size());
+  constexpr std::size_t regimes = 2;  // forwards, backwards
+  expect_paths(reader, record, mapper.travelled_.size(), regimes);
   auto cell_grids = cells.grids(reader);
   std::vector<OccupancyMap> maps;
   for (std::size_t i = 0; i < cell_grids.size(); ++i)

@@ -26,6 +26,10 @@
 #include "occupancy_map.hpp"
 #include "scan_delay.hpp"
 
+namespace example {
+class Reader;
+}
+
 namespace grid_slam {
 
 /// Standard deviations of odometry over D metres and A radians: offset + per_metre D + per_radian A.
@@ -110,8 +114,6 @@ struct PlaceWindow {
   double left = 0, bottom = 0, right = 0, top = 0;
 };
 
-class Reader;
-
 /// A place that explains a scan, and its share of what all such places explain.
 struct PossiblePlace {
   cairn::SE2 pose;
@@ -195,8 +197,8 @@ private:
 
   template <class Archive>
   static void plain_parts(Archive& archive, Mapper& mapper);
-  [[nodiscard]] static Mapper loaded(Reader& reader, const MapRequest& wanted);
-  void expect_sound(const Reader& reader) const;  // of what was read, but for map and paths
+  [[nodiscard]] static Mapper loaded(example::Reader& reader, const MapRequest& wanted);
+  void expect_sound(const example::Reader& reader) const;  // of what was read, but for map and paths
   void begin(const cairn::StampedScan& scan);
   [[nodiscard]] cairn::Gaussian<cairn::SE2> place_in_window(const cairn::StampedScan& scan);
   void accumulate(const cairn::SE2& moved);

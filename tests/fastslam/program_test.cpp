@@ -43,12 +43,28 @@ std::set<std::string> results() {
 TEST_SUITE("fastslam/program") {
   TEST_CASE("fastslam: a mistake is exit code 2 and a line") {
     const cairn_test::Folder folder;
-    for (const std::string mistake :
-         {"--nonsense", "--particles 0", "--threads 0", "--seed -1", "--data mars", "--robot 6",
-          "--identities perhaps", "--proposal none", "--association guessed", "--frames 0", "--redraw -1",
-          "--data map", "--data mrclam --folder /nowhere", "--data map --name none --folder /nowhere",
-          "--name example_webmap", "--folder /nowhere", "--robot 2", "--association drawn",
-          "--proposal motion --redraw 0.5"}) {
+    for (const std::string mistake : {"--nonsense",
+                                      "--particles 0",
+                                      "--threads 0",
+                                      "--seed -1",
+                                      "--data mars",
+                                      "--robot 6",
+                                      "--identities perhaps",
+                                      "--proposal none",
+                                      "--association guessed",
+                                      "--frames 0",
+                                      "--redraw -1",
+                                      "--data map",
+                                      "--data mrclam --folder /nowhere",
+                                      "--data map --name none --folder /nowhere",
+                                      "--name example_webmap",
+                                      "--folder /nowhere",
+                                      "--robot 2",
+                                      "--association drawn",
+                                      "--proposal motion --redraw 0.5",
+                                      "--load /nowhere/map",
+                                      "--load",
+                                      "--save"}) {
       CAPTURE(mistake);
       const Outcome outcome = run(mistake + " --out \"" + (folder / "out").string() + "\"");
       CAPTURE(outcome.words);
@@ -104,14 +120,84 @@ TEST_SUITE("fastslam/program") {
     CHECK(std::count(landmarks.begin(), landmarks.end(), '\n') == 1 + summary["landmarks"].get<int>());
   }
 
+  TEST_CASE("fastslam: --save and --load go on with a log as one run does") {
+    const cairn_test::Folder folder;
+    const auto named = [&](const std::string& name) { return "\"" + (folder / name).string() + "\""; };
+    const auto outcome_of = [&](const std::string& arguments, const std::string& out) {
+      return run(arguments + " --out " + named(out));
+    };
+    const std::string withheld = " --identities withheld", seven = " --particles 7 --seed 5";
+    REQUIRE(outcome_of("--frames 40 --save " + named("a.map") + seven + withheld, "a").code == 0);
+    REQUIRE(outcome_of("--frames 70 --load " + named("a.map") + " --save " + named("b.map") + withheld, "b")
+                .code == 0);
+    REQUIRE(outcome_of("--frames 70 --save " + named("c.map") + seven + withheld, "c").code == 0);
+    for (const std::string name : {"trajectory.txt", "landmarks.csv", "summary.json"})
+      CHECK(cairn::read_file(folder / "b" / name) == cairn::read_file(folder / "c" / name));
+    CHECK(cairn::read_file(folder / "b.map") == cairn::read_file(folder / "c.map"));
+    struct Mistake {
+      std::string arguments, words;
+    };
+    const std::string load = "--load " + named("a.map");
+    for (const auto& [arguments, words] :
+         {Mistake{load, "a.map: frame 0 of the log is not that of the map"},
+          Mistake{load + withheld + " --frames 40", "the map is of all 40 frames of the log"},
+          Mistake{load + withheld + " --frames 39", "a map of 40 frames, and the log has 39"},
+          Mistake{load + withheld + " --seed 5", "--seed is for a map that begins"},
+          Mistake{load + withheld + " --particles 7", "--particles is for a map that begins"},
+          Mistake{load + withheld + " --redraw 0.5", "--redraw is for a map that begins"},
+          Mistake{load + withheld + " --association drawn", "--association is for a map that begins"},
+          Mistake{load + " --proposal landmarks", "--proposal is for a map that begins"},
+          Mistake{"--load " + named("a/summary.json"), "summary.json: no file of the kind"},
+          Mistake{"--save " + named("none/map"), "expected the name of a file in a folder that there is"},
+          Mistake{"--save " + named("out/summary.json"), "expected another"}}) {
+      CAPTURE(arguments);
+      const Outcome outcome = outcome_of(arguments, "out");
+      CAPTURE(outcome.words);
+      CHECK(outcome.code == 2);
+      CHECK(outcome.says(words));
+      CHECK(names_in(folder / "b") == results());
+    }
+    // of data that is read nothing is written over
+    const std::filesystem::path data = folder / "data" / "post.mat";
+    fs::create_directory(folder / "data");
+    cairn::write_file_atomically(data, "lm 2 1\n8 1\nwp 2 2\n0 0\n40 0\n");
+    const std::string posts = "--data map --name post --frames 5 --folder " + named("data") + " --save ";
+    CHECK(outcome_of(posts + named("data/post.mat"), "out").says("is read by this run"));
+    CHECK(outcome_of(posts + named("data/map"), "out").code == 0);
+  }
+
+  TEST_CASE("fastslam: settings whose covariance is too sure are said to be") {
+    const cairn_test::Folder folder;
+    const auto words_of = [&](const std::string& arguments) {
+      return run("--frames 20 " + arguments + " --out \"" + (folder / "out").string() + "\"").words;
+    };
+    const std::string few = "fewer than 6 particles", never = "paths are never drawn again";
+    const auto says = [](const std::string& words, const std::string& what) {
+      return words.find(what) != std::string::npos;
+    };
+    const std::string one = words_of("--particles 1"), five = words_of("--particles 5"),
+                      six = words_of("--particles 6"), motion = words_of("--proposal motion"),
+                      published = words_of("--redraw 0");
+    CHECK((says(one, few) && says(five, few) && !says(one, never)));
+    CHECK((!says(six, few) && !says(six, never)));
+    CHECK((says(motion, never) && says(published, never) && !says(motion, few)));
+    const auto summary = nlohmann::json::parse(cairn::read_file(folder / "out" / "summary.json"));
+    CHECK(says(summary["notes"].dump(), never));
+  }
+
   TEST_CASE("fastslam: interrupted, it writes the frames until then") {
     const cairn_test::Folder folder;
-    CHECK(cairn_test::interrupt_program(
-              {program, "--particles", "50", "--frames", "20000", "--out", (folder / "out").string()},
-              {SIGTERM}, 1) == 4);
+    CHECK(cairn_test::interrupt_program({program, "--particles", "50", "--frames", "20000", "--out",
+                                         (folder / "out").string(), "--save", (folder / "map").string()},
+                                        {SIGTERM}, 1) == 4);
     CHECK(names_in(folder / "out") == results());
     const auto summary = nlohmann::json::parse(cairn::read_file(folder / "out" / "summary.json"));
     CHECK(summary["ended_early"].get<std::string>().find("interrupted (SIGTERM)") == 0);
+    const int frames = summary["frames"].get<int>();
+    CHECK(run("--frames " + std::to_string(frames + 2) + " --load \"" + (folder / "map").string() +
+              "\" --out \"" + (folder / "on").string() + "\"")
+              .code == 0);
+    CHECK(nlohmann::json::parse(cairn::read_file(folder / "on" / "summary.json"))["frames"] == frames + 2);
   }
 }
 

@@ -317,6 +317,21 @@ TEST_SUITE("filter/conditional") {
     }
     CHECK(belief.effective_ancestors(1) < 20);
   }
+
+  TEST_CASE("conditional: a belief made again of its record counts ancestors to the same bit") {
+    for (std::uint64_t seed = 1; seed < 6; ++seed) {
+      CAPTURE(seed);
+      MappedPaths<Memory> belief(Line(0.0), Memory{}, 60);
+      const ConditionalFilter filter{.seed = seed};
+      for (int step = 0; step < 15; ++step)
+        REQUIRE(filter.step(belief, motion, FromMotion{}, step + 1.0).accepted());
+      std::vector<Memory> maps;
+      for (std::size_t i = 0; i < belief.size(); ++i) maps.push_back(belief[i].map);
+      const MappedPaths<Memory> again(belief.record(), std::move(maps));  // nodes have other numbers
+      for (std::uint64_t step = 0; step <= belief.steps(); ++step)
+        CHECK(again.effective_ancestors(step) == belief.effective_ancestors(step));
+    }
+  }
 }
 
 }  // namespace conditional_test

@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -512,6 +513,92 @@ TEST_SUITE("slam/landmark_map") {
     }
     MESSAGE("at most ", most, " nodes");
     CHECK(most <= 10);
+  }
+
+  TEST_CASE("landmark_map: a map made again of its record goes on as the map itself, to the bit") {
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    for (const Pick pick : {Pick::likeliest, Pick::drawn}) {
+      Random world(seed), random(seed + 1), again(seed + 1);
+      std::vector<Plane> posts;
+      for (int i = 0; i < 60; ++i) posts.emplace_back(world.uniform(-6, 6), world.uniform(-6, 6));
+      Map map(Relative{}, {.pick = pick, .filing_distance = 0.1});
+      std::optional<Map> other;
+      int lost = 0;
+      for (int step = 0; step < 400; ++step) {
+        const Plane x(world.uniform(-5, 5), world.uniform(-5, 5));
+        Map::Observation z;
+        for (const Plane& post : posts)
+          if ((post - x).norm() < 2.5 && world.uniform() < 0.5)
+            z.push_back({Plane(post - x + normal(Relative{}.covariance, world)), {}});
+        if (step == 200) other = Map(map).restored(map.record());
+        const auto before = map.size();
+        const auto one = map.associate({x, 0.01 * motion_noise}, z, random);
+        map.insert(x, z, one.choice);
+        lost += map.size() < before ? 1 : 0;
+        again = other ? again : random;
+        if (!other) continue;
+        const auto two = other->associate({x, 0.01 * motion_noise}, z, again);
+        REQUIRE(one.choice == two.choice);
+        REQUIRE(one.log_likelihood == two.log_likelihood);
+        REQUIRE(one.log_probability == two.log_probability);
+        other->insert(x, z, two.choice);
+      }
+      CHECK(lost > 0);  // numbers that are not given again
+      const auto a = map.record(), b = other->record();
+      CHECK(a.numbers == b.numbers);
+      CHECK(a.numbers > a.landmarks.size());
+      CHECK(a.widest == b.widest);
+      REQUIRE(a.landmarks.size() == b.landmarks.size());
+      CHECK(a.landmarks.size() == map.size());
+      CHECK(other->size() == map.size());
+      for (std::size_t i = 0; i < a.landmarks.size(); ++i) {
+        const auto &p = a.landmarks[i], &q = b.landmarks[i];
+        CHECK(p.number == q.number);
+        CHECK(p.filed == q.filed);
+        CHECK(p.landmark.belief.mean == q.landmark.belief.mean);
+        CHECK(p.landmark.belief.covariance == q.landmark.belief.covariance);
+        CHECK(p.landmark.log_odds == q.landmark.log_odds);
+        CHECK(p.landmark.sightings == q.landmark.sightings);
+      }
+    }
+  }
+
+  TEST_CASE("landmark_map: a record that is none is refused in words") {
+    Map map;
+    map.insert(Plane::Zero(), {{Plane(1, 1), 2}, {Plane(2, 1), 5}});
+    const auto good = map.record();
+    CHECK(good.numbers == 6);
+    CHECK(map.restored(good).size() == 2);
+    CHECK(map.restored({}).size() == 0);
+    const auto words = [&](const auto& spoil) -> std::string {
+      auto bad = good;
+      spoil(bad);
+      try {
+        static_cast<void>(map.restored(bad));
+      } catch (const Error& error) {
+        return error.what();
+      }
+      return "";
+    };
+    const double nan = std::numeric_limits<double>::quiet_NaN();
+    CHECK(words([](auto& r) { std::swap(r.landmarks[0], r.landmarks[1]); }).find("numbers that grow") !=
+          std::string::npos);
+    CHECK(words([](auto& r) { r.landmarks[1].number = 2; }).find("numbers that grow") != std::string::npos);
+    CHECK(words([](auto& r) { r.numbers = 5; }).find("numbers that grow") != std::string::npos);
+    CHECK(words([](auto& r) { r.numbers = no_landmark; }).find("fewer numbers") != std::string::npos);
+    CHECK(words([](auto& r) { r.landmarks[0].landmark.sightings = 0; }).find("been seen") !=
+          std::string::npos);
+    CHECK(words([&](auto& r) { r.landmarks[0].landmark.log_odds = nan; }).find("finite odds") !=
+          std::string::npos);
+    CHECK_FALSE(words([&](auto& r) { r.landmarks[0].landmark.belief.mean(0) = nan; }).empty());
+    CHECK_FALSE(words([&](auto& r) { r.landmarks[0].landmark.belief.covariance(0, 0) = -1; }).empty());
+    CHECK(words([](auto& r) { r.landmarks[0].filed[1] += 0.6; }).find("near where they are filed") !=
+          std::string::npos);
+    CHECK(words([&](auto& r) { r.landmarks[0].filed[0] = nan; }).find("near where they are filed") !=
+          std::string::npos);
+    CHECK(words([](auto& r) { r.landmarks[0].filed.clear(); }).find("as many numbers") != std::string::npos);
+    CHECK(words([&](auto& r) { r.widest = nan; }).find("standard deviation") != std::string::npos);
   }
 
   TEST_CASE("from_landmarks: of sightings that do not agree with each other the fewer are left out") {

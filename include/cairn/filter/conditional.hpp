@@ -383,23 +383,29 @@ public:
   [[nodiscard]] double effective_ancestors(std::uint64_t step) const {
     CAIRN_EXPECTS(step <= step_, "effective_ancestors needs a step that was");
     const std::vector<double> weights = particles_.weights();
-    std::vector<std::pair<std::uint32_t, double>> lines;  // a node, the weight below it
-    for (std::size_t i = 0; i < size(); ++i) lines.emplace_back((*this)[i].node, weights[i]);
+    struct Line {
+      std::uint32_t node;
+      std::size_t first;  // of the particles below it, in whose order sums do not depend on nodes' numbers
+      double weight;
+    };
+    std::vector<Line> lines;
+    for (std::size_t i = 0; i < size(); ++i) lines.push_back({(*this)[i].node, i, weights[i]});
     for (std::uint64_t back = step_;; --back) {
-      std::ranges::sort(lines, {}, &std::pair<std::uint32_t, double>::first);
+      std::ranges::sort(lines, {}, [](const Line& line) { return std::pair(line.node, line.first); });
       std::size_t kept = 0;
       for (std::size_t i = 1; i < lines.size(); ++i) {
-        if (lines[i].first == lines[kept].first)
-          lines[kept].second += lines[i].second;
+        if (lines[i].node == lines[kept].node)
+          lines[kept].weight += lines[i].weight;
         else
           lines[++kept] = lines[i];
       }
       lines.resize(kept + 1);
       if (back == step) break;
-      for (auto& line : lines) line.first = paths_.parent(line.first);
+      for (Line& line : lines) line.node = paths_.parent(line.node);
     }
+    std::ranges::sort(lines, {}, &Line::first);
     double squares = 0;
-    for (const auto& line : lines) squares += line.second * line.second;
+    for (const Line& line : lines) squares += line.weight * line.weight;
     return 1 / squares;
   }
 

@@ -164,6 +164,19 @@ struct MappedLandmark {
   std::uint32_t sightings = 0;  ///< 0: there is none of this number
 };
 
+/// All of a LandmarkMap but its sensor and options, as plain values: for files.
+template <Manifold M>
+struct LandmarkMapRecord {
+  struct Landmark {
+    std::uint32_t number = 0;
+    MappedLandmark<M> landmark{};
+    std::vector<double> filed{};  ///< where the index has it, which may lag behind; none without an index
+  };
+  std::vector<Landmark> landmarks{};  ///< that are there, by growing numbers
+  std::uint32_t numbers = 0;          ///< one beyond the greatest that was ever given
+  double widest = 0;                  ///< standard deviation of any landmark's place that was ever filed
+};
+
 namespace detail {
 
 /// The sensor as an ordinary one of the pose, over a landmark that is as uncertain as believed:
@@ -252,6 +265,13 @@ public:
     else
       return landmarks_.node_copies();
   }
+
+  /// What makes this map again. O(n).
+  [[nodiscard]] LandmarkMapRecord<Landmark> record() const;
+  /// The map that record() described, with this one's sensor and options: whatever it is asked or told, its
+  /// answers are the same bits. O(n log n). Throws Error where numbers do not grow or a landmark is none: its
+  /// mean not finite, its covariance none, never seen, filed too far from where it is.
+  [[nodiscard]] LandmarkMap restored(const LandmarkMapRecord<Landmark>& record) const;
 
   /// Which landmarks these sightings are of, for a pose that may be uncertain: its mean, and covariances that
   /// it adds to what is predicted; a zero covariance is a pose that is known. The likelihood is the product
@@ -358,6 +378,7 @@ private:
   [[nodiscard]] double gained_odds(const Pose& x, const Landmark& m) const;
   [[nodiscard]] double certain_detection(const Pose& x, const Gaussian<Landmark>& landmark) const;
   void file(std::uint32_t number, bool is_new);
+  void file_at(std::uint32_t number, const std::vector<double>& filed);
 
   std::shared_ptr<const Common> common_;
   SharedArray<MappedLandmark<Landmark>> landmarks_;
@@ -763,6 +784,66 @@ void LandmarkMap<L, F>::insert(const Pose& x, const Observation& z, const Choice
     }
   }
   if (unnamed) miss(x, seen);
+}
+
+template <LandmarkSensor L, class F>
+auto LandmarkMap<L, F>::record() const -> LandmarkMapRecord<Landmark> {
+  LandmarkMapRecord<Landmark> record{.numbers = static_cast<std::uint32_t>(landmarks_.size())};
+  for_each([&](std::uint32_t number, const MappedLandmark<Landmark>& landmark) {
+    auto& last = record.landmarks.emplace_back();
+    last.number = number;
+    last.landmark = landmark;
+    if constexpr (is_placed) last.filed.assign(places_.filed[number].begin(), places_.filed[number].end());
+  });
+  if constexpr (is_placed) record.widest = places_.widest;
+  return record;
+}
+
+template <LandmarkSensor L, class F>
+auto LandmarkMap<L, F>::restored(const LandmarkMapRecord<Landmark>& record) const -> LandmarkMap {
+  LandmarkMap map(*this);
+  map.landmarks_ = {};
+  map.places_ = {};
+  map.size_ = 0;
+  if (record.numbers > most_identity) raise("LandmarkMap: expected a record of fewer numbers");
+  if (record.numbers > 0) static_cast<void>(map.landmarks_.write(record.numbers - 1));
+  std::uint32_t least = 0;
+  for (const auto& [number, landmark, filed] : record.landmarks) {
+    if (number < least || number >= record.numbers) raise("LandmarkMap: expected numbers that grow");
+    least = number + 1;
+    if (landmark.sightings == 0 || !std::isfinite(landmark.log_odds))
+      raise("LandmarkMap: expected landmarks that have been seen, with finite odds");
+    static_cast<void>(Gaussian<Landmark>::checked(landmark.belief.mean, landmark.belief.covariance));
+    if (!detail::finite_state(landmark.belief.mean)) raise("LandmarkMap: expected finite landmarks");
+    map.landmarks_.write(number) = landmark;
+    ++map.size_;
+    map.file_at(number, filed);
+  }
+  if constexpr (is_placed) {
+    if (!(record.widest <= std::numeric_limits<double>::max()))
+      raise("LandmarkMap: expected a finite standard deviation");
+    map.places_.widest = std::max(map.places_.widest, record.widest);
+  }
+  return map;
+}
+
+/// As file() left it.
+template <LandmarkSensor L, class F>
+void LandmarkMap<L, F>::file_at(std::uint32_t number, const std::vector<double>& filed) {
+  if (filed.size() != static_cast<std::size_t>(places))
+    raise("LandmarkMap: expected as many numbers of where a landmark is filed as of its place");
+  if constexpr (is_placed) {
+    const Gaussian<Landmark>& belief = find(number)->belief;
+    auto& at = places_.filed.write(number);
+    for (int a = 0; a < places; ++a) {
+      const auto i = static_cast<std::size_t>(a);
+      at[i] = filed[i];
+      if (!(std::abs(static_cast<double>(belief.mean(a)) - at[i]) <= options().filing_distance))
+        raise("LandmarkMap: expected landmarks near where they are filed");
+      places_.widest = std::max(places_.widest, std::sqrt(static_cast<double>(belief.covariance(a, a))));
+    }
+    places_.tree.insert(at, number);
+  }
 }
 
 template <LandmarkSensor L, class F>

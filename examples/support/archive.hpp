@@ -19,11 +19,10 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/linalg.hpp>
-#include <cairn/filter/gaussian.hpp>
 #include <cairn/io/binary_file.hpp>
 #include <cairn/manifold/se2.hpp>
 
-namespace grid_slam {
+namespace example {
 
 template <class T>
 concept PlainNumber = std::is_arithmetic_v<T> || std::is_enum_v<T>;
@@ -146,9 +145,4 @@ private:
   cairn::BinaryReader in_;
 };
 
-template <class Archive>
-void parts(Archive& archive, cairn::Gaussian<cairn::SE2>& belief) {
-  archive(belief.mean, belief.covariance);
-}
-
-}  // namespace grid_slam
+}  // namespace example
