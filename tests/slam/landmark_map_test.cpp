@@ -564,6 +564,22 @@ TEST_SUITE("slam/landmark_map") {
     }
   }
 
+  TEST_CASE("landmark_map: a map made again gives no number again, and looks as far as the map did") {
+    Relative sure;
+    sure.probability = 0.99;
+    Map map(sure);
+    map.insert(Plane::Zero(), {{Plane(1, 0), {}}, {Plane(0, 1), {}}});
+    for (int step = 0; step < 9; ++step) map.insert(Plane::Zero(), {{Plane(1, 0), {}}});
+    REQUIRE(map.find(1) == nullptr);
+    Map again = map.restored(map.record());
+    CHECK(again.record().widest == map.record().widest);
+    const Gaussian<Plane>& left = map.find(0)->belief;  // surer than any was when it was filed
+    CHECK(map.record().widest > 2 * std::sqrt(left.covariance(1, 1)));
+    for (Map* each : {&map, &again}) each->insert(Plane::Zero(), {{Plane(1, 0), {}}, {Plane(0, 1), {}}});
+    CHECK(map.find(2) != nullptr);
+    CHECK(again.find(2) != nullptr);
+  }
+
   TEST_CASE("landmark_map: a record that is none is refused in words") {
     Map map;
     map.insert(Plane::Zero(), {{Plane(1, 1), 2}, {Plane(2, 1), 5}});
