@@ -30,7 +30,7 @@ using Row = std::vector<double>;
 
 /// What a file's first columns are: times, the numbers of subjects or bar codes (whole, below 2^24), any
 /// other numbers, or distances, which are above zero.
-enum class Column { time, identity, number, distance };
+enum class Column { time, identity, number, distance, speed };
 
 /// Puts rows in the order of their times, those of one time as they stood. Returns how many were before an
 /// earlier one: the ninth set's odometry begins with a line that is a tenth of a second late.
@@ -51,6 +51,7 @@ std::size_t put_in_order(std::vector<Row>& rows) {
 std::vector<Row> read_rows(const std::filesystem::path& path, std::initializer_list<Column> columns) {
   cairn::TextLines lines(path, "a file of the UTIAS set");
   std::vector<Row> rows;
+  constexpr double fastest = 1000;  // no robot is, and motions remain finite
   while (lines.next('#')) {
     double numbers[most_columns];
     if (lines.numbers(' ', numbers, columns.size()) < columns.size())
@@ -61,6 +62,9 @@ std::vector<Row> read_rows(const std::filesystem::path& path, std::initializer_l
       if (kind == Column::identity && !(n >= 0 && n < Map::most_identity && n == std::floor(n)))
         lines.fail("a whole number from 0 to below 2^24 in column " + std::to_string(i + 1));
       if (kind == Column::distance && !(n > 0)) lines.fail("a distance above zero");
+      if (kind == Column::speed && !(std::abs(n) <= fastest))
+        lines.fail("a speed of at most " + cairn::shortest(fastest) + " m/s or rad/s in column " +
+                   std::to_string(i + 1));
     }
     rows.emplace_back(numbers, numbers + columns.size());
   }
@@ -78,7 +82,7 @@ struct Files {
   std::map<std::uint32_t, Vector<2>> landmarks;
 
   Files(const std::filesystem::path& folder, const std::string& robot) {
-    for (const Row& r : read_timed(folder / (robot + "_Odometry.dat"), {time, number, number}))
+    for (const Row& r : read_timed(folder / (robot + "_Odometry.dat"), {time, speed, speed}))
       odometry.push_back({r[0], r[1], r[2]});
     for (const Row& r : read_timed(folder / (robot + "_Measurement.dat"), {time, identity, distance, number}))
       sightings.push_back({r[0], static_cast<int>(r[1]), r[2], r[3]});

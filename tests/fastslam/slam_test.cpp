@@ -511,6 +511,11 @@ TEST_SUITE("fastslam/slam") {
     CHECK(complaint(robot).find("Robot1_Measurement.dat:1") != std::string::npos);
     put_robot(folder, "0 1 0\n2 1\n", "1.5 63 2 0\n");
     CHECK(complaint(robot).find("Robot1_Odometry.dat:2") != std::string::npos);
+    for (const std::string fast : {"1e308 0", "0 -1e308", "1001 0"}) {
+      put_robot(folder, "0 1 0\n2 " + fast + "\n", "1.5 63 2 0\n");
+      CHECK(complaint(robot).find("Robot1_Odometry.dat:2: expected a speed of at most 1000") !=
+            std::string::npos);
+    }
     put_robot(folder, "0 1 0\n2 1 0\n", "1.5 99 2 0\n");
     CHECK(complaint(robot).find("saw no landmark") != std::string::npos);
     CHECK(complaint([&] { return read_mrclam(folder / "none", 1); }) != "");
@@ -559,6 +564,8 @@ TEST_SUITE("fastslam/slam") {
           std::string::npos);
     CHECK(map("lm 2 3\n1 2\n") != "");
     CHECK(map("lm 2 1\n1 inf\nwp 2 1\n0 0\n").find(":2") != std::string::npos);
+    CHECK(map("lm 2 1\n1 2\nwp 2 1\n0 0\n").find(":4: expected a way of at least two points") !=
+          std::string::npos);
   }
 
   TEST_CASE(

@@ -162,6 +162,22 @@ TEST_SUITE("filter/conditional") {
     CHECK(one == run(7));
   }
 
+  TEST_CASE("conditional: a motion whose covariance is none is refused in words, and changes nothing") {
+    MappedPaths<Memory> belief(Line(0.0), Memory{}, 3);
+    const ConditionalFilter filter;
+    for (const double variance : {std::numeric_limits<double>::quiet_NaN(), -1.0}) {
+      const auto wrong = [&](const Line& x, std::size_t) {
+        return Gaussian<Line>{x, Matrix<1>::Constant(variance)};
+      };
+      CHECK(cairn_test::message_of([&] {
+              static_cast<void>(filter.step(belief, wrong, FromMotion{}, 1.0));
+            }).find("FromMotion: expected a motion whose covariance is finite") == 0);
+      CHECK(belief.steps() == 0);
+    }
+    const auto exact = [](const Line& x, std::size_t) { return Gaussian<Line>{x, Matrix<1>::Zero()}; };
+    CHECK(filter.step(belief, exact, FromMotion{}, 1.0).accepted());
+  }
+
   TEST_CASE("conditional: a step that is refused changes nothing") {
     MappedPaths<Memory> belief(Line(0.0), Memory{}, 5);
     const double nan = std::numeric_limits<double>::quiet_NaN();

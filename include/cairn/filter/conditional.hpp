@@ -21,6 +21,7 @@
 #include <cstdint>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -143,7 +144,8 @@ struct RegimeMotion {
 };
 
 /// Poses drawn from the motion and weighed by the likelihood: the bootstrap filter. Of several draws a
-/// particle keeps one by its likelihood, and weighs their mean: as unbiased as one draw, and steadier.
+/// particle keeps one by its likelihood, and weighs their mean: as unbiased as one draw, and steadier. Throws
+/// Error where the motion's covariance is none; it may be singular.
 struct FromMotion {
   std::size_t draws = 1;  ///< at least 1
 
@@ -198,7 +200,10 @@ private:
   template <ConditionalMap M>
   [[nodiscard]] static ProposedOf<M> draw(auto& map, const Gaussian<typename M::Pose>& motion,
                                           const typename M::Observation& z, Random& random) {
-    typename M::Pose pose = sample(motion, random);
+    std::optional<typename M::Pose> drawn = detail::drawn_from(motion, random);
+    if (!drawn)
+      raise("FromMotion: expected a motion whose covariance is finite, symmetric and positive semi-definite");
+    typename M::Pose& pose = *drawn;
     if constexpr (ChoosingMap<M>) {
       Chosen<ChoiceOf<M>> c = map.choose(pose, z, random);
       const double log_weight = c.log_likelihood - c.log_probability;

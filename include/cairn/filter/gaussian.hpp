@@ -8,8 +8,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 #include <cairn/core/check.hpp>
 #include <cairn/core/factor.hpp>
@@ -187,18 +189,30 @@ template <Manifold X>
   return detail::squared_mahalanobis<dof<X>, ScalarOf<X>>(d, belief.covariance);
 }
 
+namespace detail {
+
+/// A state drawn from the belief; nothing where its covariance is none.
+template <Manifold X>
+[[nodiscard]] std::optional<X> drawn_from(const Gaussian<X>& belief, Random& random) {
+  if (common_size(belief.mean, belief.covariance) <= 0) return std::nullopt;
+  Tangent<X> d = manifold_traits<X>::local(belief.mean, belief.mean);
+  for (int i = 0; i < static_cast<int>(d.size()); ++i) d(i) = static_cast<ScalarOf<X>>(random.normal());
+  CovarianceOf<X> root = belief.covariance;
+  if (!dense_root<dof<X>, ScalarOf<X>>(belief.covariance, root)) return std::nullopt;
+  const Tangent<X> step = root * d;
+  return retract(belief.mean, step);
+}
+
+}  // namespace detail
+
 /// A state drawn from the belief, whose covariance may be singular but must be one.
 template <Manifold X>
 [[nodiscard]] X sample(const Gaussian<X>& belief, Random& random) {
   CAIRN_EXPECTS(detail::common_size(belief.mean, belief.covariance) > 0,
                 "sample needs a covariance of the mean's size");
-  Tangent<X> d = manifold_traits<X>::local(belief.mean, belief.mean);
-  for (int i = 0; i < static_cast<int>(d.size()); ++i) d(i) = static_cast<ScalarOf<X>>(random.normal());
-  CovarianceOf<X> root = belief.covariance;
-  const bool good = detail::dense_root<dof<X>, ScalarOf<X>>(belief.covariance, root);
-  CAIRN_EXPECTS(good, "sample needs a covariance: finite, symmetric and positive semi-definite");
-  const Tangent<X> step = root * d;
-  return retract(belief.mean, step);
+  std::optional<X> drawn = detail::drawn_from(belief, random);
+  CAIRN_EXPECTS(drawn, "sample needs a covariance: finite, symmetric and positive semi-definite");
+  return *std::move(drawn);
 }
 
 }}  // namespace cairn::CAIRN_ABI
