@@ -13,6 +13,7 @@
 #include <cairn/core/random.hpp>
 #include <cairn/io/file.hpp>
 
+#include "support/data.hpp"
 #include "support/folder.hpp"
 #include "support/page_check.hpp"
 #include "support/program.hpp"
@@ -32,15 +33,19 @@ bool is_built(const std::string& program) {
 class Pages {
 public:
   void add(const std::string& program, const std::string& arguments) {
-    if (!is_built(program)) return;
+    if (is_built(program)) add(program, CAIRN_EXAMPLE_FOLDER "/" + program, arguments, "report.html");
+  }
+  /// The same of a program that is elsewhere, or whose page has another name.
+  void add(const std::string& program, const std::string& path, const std::string& arguments,
+           const std::string& page) {
     const std::filesystem::path out = folder_ / (program + std::to_string(pages_.size()));
-    const auto outcome = cairn_test::run_program("'" CAIRN_EXAMPLE_FOLDER "/" + program + "' " + arguments +
-                                                 " --out '" + out.string() + "'");
+    const auto outcome =
+        cairn_test::run_program("'" + path + "' " + arguments + " --out '" + out.string() + "'");
     CAPTURE(program);
     CAPTURE(outcome.words);
     REQUIRE(outcome.code == 0);
-    REQUIRE(cairn_test::keep_picture(folder_, out / "report.html", program));
-    pages_.push_back(out / "report.html");
+    REQUIRE(cairn_test::keep_picture(folder_, out / page, program));
+    pages_.push_back(out / page);
   }
   void check() const { cairn_test::check_pages(pages_); }
   [[nodiscard]] const cairn_test::Folder& folder() const { return folder_; }
@@ -81,6 +86,18 @@ TEST_CASE("the page of every program opens without a word on the console, and ax
     files += "'" + (pages.folder() / name).string() + "' ";
   }
   pages.add("cairn_eval", files);
+#if defined(EXAMPLES_HAVE_YAML) && defined(EXAMPLES_HAVE_JPEG)
+  if (const auto data = cairn_test::real_data("stereo_pairs")) {
+    const std::string boards = (*data / "opencv-chessboard-stereo").string();
+    pages.add("calibrate_stereo",
+              "--left '" + boards + "/left0[1-5].jpg' --right '" + boards + "/right0[1-5].jpg'");
+  }
+#endif
+#ifdef CAIRN_STUDY_PROGRAM
+  pages.add("index_study", CAIRN_STUDY_PROGRAM, "--brief", "index_study.html");
+#else
+  MESSAGE("skipped: no program index_study (CAIRN_BUILD_BENCHMARKS)");
+#endif
   pages.check();
 }
 

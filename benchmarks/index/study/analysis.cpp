@@ -162,6 +162,12 @@ Result result_of(const Stream& stream, const std::vector<double>& grid, Drive dr
 
 }  // namespace
 
+double total_time(const Drive& drive) {
+  double sum = 0;
+  for (const Sample& sample : drive.samples) sum += (sample.build + sample.search) * sample.steps;
+  return sum;
+}
+
 Study analyse(Stream stream, std::vector<Drive> drives) {
   Study study;
   study.grid = make_grid(stream);

@@ -52,7 +52,11 @@ struct Study {
   Stream stream;
   std::vector<double> grid;  ///< n, growing geometrically
   std::vector<Result> results;
+  std::vector<double> gains = {};  ///< the single tree's time over the best forest's, of several runs of both
 };
+
+/// Of all steps together [s].
+double total_time(const Drive& drive);
 
 /// Takes the drives of one stream together.
 Study analyse(Stream stream, std::vector<Drive> drives);

@@ -33,15 +33,17 @@ using cairn_study::Stream;
 using cairn_study::Study;
 
 struct Options {
-  bool full = false;
+  bool full = false, brief = false;
   std::string only;  ///< name of one stream
   std::filesystem::path out = "build/benchmark";
 };
 
 constexpr const char* usage =
-    "usage: index_study [--quick | --full] [--only points_3|clusters_64|sift_128|surf_64|recall] [--out "
+    "usage: index_study [--quick | --full | --brief] [--only points_3|clusters_64|sift_128|surf_64|recall] "
+    "[--out "
     "FOLDER]\n"
     "  --quick   up to 3e5 points and 5e4 descriptors, about three minutes (the default)\n"
+    "  --brief   points_3 and clusters_64 to 1e4, in seconds: to see what the page holds\n"
     "  --full    up to 1e7 points and 1e6 descriptors, half an hour\n"
     "  --version, --help\n";
 
@@ -53,8 +55,9 @@ std::variant<Options, int> parse(int argc, char** argv) {
   Options options;
   for (int i = 1; i < argc; ++i) {
     const std::string_view word = argv[i];
-    if (word == "--full" || word == "--quick") {
+    if (word == "--full" || word == "--quick" || word == "--brief") {
       options.full = word == "--full";
+      options.brief = word == "--brief";
     } else if (word == "--only" && i + 1 < argc &&
                std::ranges::find(stream_names, std::string_view(argv[i + 1])) != stream_names.end()) {
       options.only = argv[++i];
@@ -91,9 +94,9 @@ Study study(Stream stream) {
   const cairn_study::Truth truth = make_truth(stream);
   const cairn_study::StoreOptions options{stream.dim, stream.leaves};
   const auto list = contenders();
-  example::Progress progress(std::cerr, stream.name, list.size() * stream.steps());
-  std::vector<Drive> drives;
-  for (const Contender& contender : list) {
+  constexpr std::size_t repeats = 2;  // of the two that are set against each other
+  example::Progress progress(std::cerr, stream.name, (list.size() + 2 * repeats) * stream.steps());
+  const auto drive_of = [&](const Contender& contender) {
     const bool is_scan = contender.name == "scan";
     const bool is_single = contender.name == "single tree";
     const auto store =
@@ -109,20 +112,35 @@ Study study(Stream stream) {
     drive.name = contender.name;
     drive.growth = contender.growth;
     drive.first_steps = contender.first_steps;
-    drives.push_back(std::move(drive));
+    return drive;
+  };
+  std::vector<Drive> drives;
+  for (const Contender& contender : list) drives.push_back(drive_of(contender));
+  std::size_t best = 1;  // the first forest; the scan is the last
+  for (std::size_t i = 2; i + 1 < drives.size(); ++i)
+    if (total_time(drives[i]) < total_time(drives[best])) best = i;
+  std::vector<double> gains{total_time(drives[0]) / total_time(drives[best])};
+  while (gains.size() <= repeats) {
+    const double single = total_time(drive_of(list[0]));
+    gains.push_back(single / total_time(drive_of(list[best])));
   }
-  return analyse(std::move(stream), std::move(drives));
+  Study all = analyse(std::move(stream), std::move(drives));
+  all.gains = std::move(gains);
+  return all;
 }
 
 std::vector<Study> run_all(const Options& options) {
   using Make = std::function<std::optional<Stream>()>;
   const bool full = options.full;
-  const std::size_t steps = full ? 1000 : 250;
-  const std::vector<std::pair<std::string_view, Make>> streams{
-      {stream_names[0], [&] { return cairn_study::uniform_points(full ? 10000000 : 300000, steps); }},
-      {stream_names[1], [&] { return cairn_study::clustered(full ? 1000000 : 50000, steps); }},
+  const std::size_t steps = full ? 1000 : options.brief ? 50 : 250;
+  const std::size_t points = full ? 10000000 : options.brief ? 10000 : 300000;
+  const std::size_t clusters = full ? 1000000 : options.brief ? 10000 : 50000;
+  std::vector<std::pair<std::string_view, Make>> streams{
+      {stream_names[0], [&] { return cairn_study::uniform_points(points, steps); }},
+      {stream_names[1], [&] { return cairn_study::clustered(clusters, steps); }},
       {stream_names[2], [&] { return cairn_study::sift_descriptors(full ? 99000 : 40000, steps); }},
       {stream_names[3], [&] { return cairn_study::arena_descriptors(full ? 0 : 40, steps); }}};
+  if (options.brief) streams.resize(2);
   std::vector<Study> studies;
   for (const auto& [name, make] : streams) {
     if (!options.only.empty() && options.only != name) continue;
@@ -144,8 +162,10 @@ example::ResultFolder results_in(const std::filesystem::path& folder) {
 std::size_t finish(const std::vector<Study>& studies, const std::vector<cairn_study::RecallStudy>& recalls,
                    const Options& options) {
   const cairn_bench::Context here = cairn_bench::context();
-  const std::string subtitle =
-      here.cpu + ", one thread; " + here.compiler + "; " + here.flags + (options.full ? "; full" : "; quick");
+  const std::string subtitle = here.cpu + ", one thread; " + here.compiler + "; " + here.flags +
+                               (options.full    ? "; full"
+                                : options.brief ? "; brief"
+                                                : "; quick");
   const auto page = make_report(studies, recalls, subtitle).html();
   results_in(options.out).replace([&](const std::filesystem::path& staging) {
     cairn::write_file_atomically(staging / "index_study.json", to_json(studies));
@@ -172,9 +192,10 @@ int main(int argc, char** argv) try {
   const Options& options = std::get<Options>(asked);
   results_in(options.out).prepare();
   const std::vector<Study> studies = run_all(options);
-  const std::vector<cairn_study::RecallStudy> recalls = options.only.empty() || options.only == "recall"
-                                                            ? cairn_study::recall_studies()
-                                                            : std::vector<cairn_study::RecallStudy>{};
+  const std::vector<cairn_study::RecallStudy> recalls =
+      (options.only.empty() && !options.brief) || options.only == "recall"
+          ? cairn_study::recall_studies()
+          : std::vector<cairn_study::RecallStudy>{};
   if (studies.empty() && recalls.empty()) {
     std::cerr << "index_study: nothing was run\n" << usage;
     return 2;
