@@ -70,7 +70,7 @@ std::string summary(const Results& r) {
 example::Table number_table(const BoardCalibration& c) {
   example::Table table{.title = "The rig",
                        .caption = "Estimates with their standard deviations. Pixels, radians, metres.",
-                       .columns = {"", "left", "sigma", "right", "sigma"},
+                       .columns = {"number", "left", "sigma", "right", "sigma"},
                        .rows = {}};
   const auto left = parameters_of(c.rig.rig.left), right = parameters_of(c.rig.rig.right);
   for (std::size_t i = 0; i < names.size(); ++i)
