@@ -8,21 +8,21 @@
 // Q, which is mostly tuned until a curve looks nice.
 //
 //   x   height, velocity, acceleration   [m, m/s, m/s^2]    dt  time since the last reading            [s]
-//   P   covariance of the belief in x                       z   a reading of the height; h = H x, expected
-//   q   density of the gusts' jerk       [(m/s^3)^2 s]      S   variance of z, as the filter expects [m^2]
-//   (jerk: how fast acceleration changes)                   K   gain: a share of the surprise for each of x
+//   P   covariance of the belief in x                       H   [1 0 0]: of x a reading sees the height
+//   F   motion over dt;   Q  covariance that gusts add      z   a reading of the height; h = H x, expected
+//   q   density of gusts: variance that acceleration        S   variance of z, as the filter expects [m^2]
+//       gains each second, (m/s^2)^2 / s = (m/s^3)^2 s      K   gain: a share of the surprise for each of x
 // EQUATIONS (Bar-Shalom, Li, Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001)
 //   x <- F x,  P <- F P F' + Q,   F = [1 dt dt^2/2; 0 1 dt; 0 0 1]                        (section 6.2.3)
 //   Q = q [dt^5/20 dt^4/8 dt^3/6; dt^4/8 dt^3/3 dt^2/2; dt^3/6 dt^2/2 dt]
-//   S = H P H' + sigma^2,  K = P H' / S,  x <- x + K (z - h),  P <- (1 - K H) P,  H = [1 0 0]  (as in 01)
+//   S = H P H' + sigma^2,  K = P H' / S,  x <- x + K (z - h),  P <- (1 - K H) P         (as in 01)
 //   NIS  = (z - h)^2 / S                   surprise over expected surprise; its mean is 1   (section 5.4)
 //   NEES = (x - truth)' P^-1 (x - truth)   error over expected error; its mean is 3, for 3 numbers
 // LOOK AT  the film while you move q: too small, and the truth leaves the narrow band; too large, and it
 // rattles in a wide one. Then the plot: around q the error hardly changes; NIS does, and needs no truth.
-//
 // CHANGE THIS (answers at the end of the file)
-//   1. Tell `radar` in filter() a sigma of 1 m; the true one stays 0.5 m. Where does NIS (sweep.csv) cross 1
-//   now?
+//   1. Tell `radar` in filter() a sigma of 1 m; the true one stays 0.5 m. At what q does NIS cross 1 now
+//   (sweep.csv beside the page; between two rows)?
 //   2. readings = 10, and --steps 50. How wide is the band of NIS, and can it still tell q from 2 q?
 //   3. Which entries of Q change if every dt is doubled, and by how much?
 #include <cmath>
@@ -91,8 +91,7 @@ int main(int argc, char** argv) {
        .least_steps = 50,
        .mistakes = {{"first-noise", "each step has the Q of the first; pykalman #44, 2015, to PR #166, 2025"},
                     {"old-covariance",
-                     "the update lowers P from before the prediction; "
-                     "Kalmanfilter_altimeter_vario #2"}}},
+                     "the update lowers P from before the prediction; Kalmanfilter_altimeter_vario #2"}}},
       argc, argv);
   cairn::Random random(lesson.seed());
   std::vector<Drop> drops;
@@ -144,7 +143,8 @@ int main(int argc, char** argv) {
   lesson.csv("sweep", {"q_factor", "nis", "nees", "rms_m", "nis_low", "nis_high"}, sweep);
   return lesson.finish();
 }
-// ANSWERS  1. Near 0.065 of the true q, with a NEES of 22 there: one NIS cannot set both R and q. Look
-// at whether surprises follow one another, too: they are independent where both are right.
-// 2. 1 +- 0.28, and no: 1.8 q gives 1.00, 10 q still 0.93; even q / 100 is no longer seen. 3. Top left 32
-// times (dt^5), bottom right twice, between 16, 8 and 4 times.
+// ANSWERS  1. Near 0.065 of the true q, with a NEES of 22 there: one NIS cannot set both R and q. Whether
+// each surprise is like the one before (not printed here) tells: they correlate by 0.74 there, by 0 where
+// both are right.
+// 2. 0.74 to 1.30 (the verdict's line), and no: 1.8 q gives 1.00, 10 q still 0.93; even q / 100 is no longer
+// seen. 3. Top left 32 times (dt^5), bottom right twice, between 16, 8 and 4 times.

@@ -6,7 +6,7 @@
 // STORY  You drive off to the north for one second, at 1 m/s or so. Your compass is poor: the heading is off
 // by 15 degrees or so. Where are you? Somewhere on an arc; many such drives end in the shape of a banana.
 //
-//   x, y  place [m]     theta  heading [rad], 90 degrees with a deviation of s     v  speed, 1 +- 0.02 [m/s]
+//   x, y  place [m]     theta  heading from east, 90 degrees, sigma s [rad]        v  speed, 1 +- 0.02 [m/s]
 //   P     covariance of these four                     G  Jacobian of f            dt  time driven, 1 [s]
 //   xx, yy  variances of x and of y [m^2]              E  mean over all drives     f   one drive
 // EQUATIONS  f:  x <- x + v cos(theta) dt,   y <- y + v sin(theta) dt
@@ -18,9 +18,10 @@
 // LOOK AT  the film while the compass gets worse. The extended filter's ellipse grows sideways only: a line
 // does not know that turning either way leads south. The unscented one has the right size and place.
 // CHANGE THIS (answers at the end of the file)
-//   1. Give Unscented alpha = 1e-3, beta = 2, kappa = 0 (how its points lie), as many do. And yy?
-//   2. --steps 500, 100000: what becomes of the band for particles' error of y? How many match Unscented?
-//   3. Tell all three that x = 0.5 m (docs/course.md says how). Which one then knows that y is 0.87 m?
+//   1. Give Unscented alpha = 1e-3, beta = 2, kappa = 0 (how its points lie and weigh), as many do. And yy?
+//   2. --steps 500, 100000: what becomes of the band for particles' error of y? How many particles would it
+//   take for an error as small as the unscented's?
+//   3. Tell all three that x = 0.5 m (docs/course.md, "Lesson 04"). Which then knows that y is 0.87 m?
 #include <cmath>
 #include <numbers>
 
@@ -121,7 +122,6 @@ int main(int argc, char** argv) {
         "extended holds " + readable(held[1]) + " % of them, unscented " + readable(held[2]) + " %";
     film.frames.push_back({held[0], words, {drives, straight, round, dashed}});
     if (degrees != 15) continue;
-
     const double y = std::exp(-s * s / 2), wave = std::exp(-2 * s * s), root = std::sqrt(lesson.steps());
     const double xx = 1.0004 * (1 - wave) / 2, yy = 1.0004 * (1 + wave) / 2 - y * y;
     const double off = 5 * std::sqrt(yy) / root, share = 7 / root;  // 5 sigma of mean, variance
@@ -146,5 +146,5 @@ int main(int argc, char** argv) {
   return lesson.finish();
 }
 // ANSWERS  1. It is 0.00275, 7 % too large, and red as is the error of y: beta = 2 suits other bends.
-// 2. 14 times narrower: the error is like 0.05 / sqrt(n). Unscented's 2.6e-6 would take about 4e8 of them.
+// 2. The band is 14 times narrower (a single error is luck): like 0.05 / sqrt(n). For 2.6e-6, about 4e8.
 // 3. The particles: 0.87. Extended says 1.00, unscented 0.97: a Gaussian has no shape to remember.

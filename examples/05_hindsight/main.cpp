@@ -8,7 +8,7 @@
 // that the ride went straight on. In the evening one knows where it came out.
 //
 //   x, P    position and velocity, east and north [m, m/s], and their covariance, at step k by the filter
-//   F, Q    motion from step k to k + 1, and its noise            x-, P-  predicted from k for k + 1
+//   F, Q    motion from step k to k + 1, and its noise     x-, P-  predicted for k + 1: F x, F P F' + Q
 //   xs, Ps  the same as x and P, given everything that was ever measured         G  gain of the smoother
 // EQUATIONS (H. Rauch, F. Tung, C. Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA
 // Journal 3, 1965), from the last step, where both are the same, back to the first:
@@ -16,7 +16,7 @@
 // LOOK AT  the two ellipses in the film: the filter's swells in the tunnel and jumps at its end, the
 // smoother's is widest in the middle; its dashed way finds the tunnel's end, which the filter's misses.
 // CHANGE THIS (answers at the end of the file)
-//   1. Make the tunnel 20 s long (steps = 60, out = 40). How much wider does either get, at its widest?
+//   1. Make the tunnel 20 s long (the constants: steps = 60, out = 40). How wide does either get, at most?
 //   2. Make the cyclist ride straight on (density 1e-6). What becomes of the two in the tunnel?
 //   3. (No change.) At the last step filter and smoother agree. At the first, which is surer, and why?
 #include <algorithm>
@@ -145,6 +145,6 @@ int main(int argc, char** argv) {
   lesson.csv("ride", {"t", "x", "y", "zx", "zy", "fx", "fy", "sx", "sy", "filter", "smoother"}, rows);
   return lesson.finish();
 }
-// ANSWERS  1. The filter's 2 sigma from 24 to 68 m, by 2 to the power 1.5; the smoother's from 4.8 to 11 m.
-// 2. 4 m and 1 m at its end: who rides straight on needs no receiver in a tunnel.
-// 3. The smoother, 3.7 m against 6 m: it has seen the ride, the filter has only guessed.
+// ANSWERS (this seed)  1. The filter's 2 sigma from 24 to 68 m, like time^1.5 (Q has dt^3/3, a variance); the
+// smoother's from 4.8 to 11 m. 2. 4 m and 1 m at its end: who goes straight needs no receiver in a tunnel.
+// 3. The smoother, 2 sigma of 3.7 m against 6 m: it has seen the ride, the filter has only guessed.
