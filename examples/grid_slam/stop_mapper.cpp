@@ -18,6 +18,7 @@
 #include "filled_path.hpp"
 #include "loop_closing.hpp"
 #include "map_image.hpp"
+#include "odometry_frame.hpp"
 #include "room.hpp"
 #include "run.hpp"
 
@@ -148,10 +149,14 @@ class StopMapper {
 public:
   using Belief = cairn::MappedPaths<Map>;
 
-  StopMapper(const SE2& start, const StopMapperOptions& options)
-      : options_(options), belief_(start, Map::empty(options), options.particles) {}
+  StopMapper(const SE2& T_odom_first, const StopMapperOptions& options)
+      : options_(options),
+        T_odom_first_(T_odom_first),
+        belief_(options.start.value_or(T_odom_first), Map::empty(options), options.particles) {}
 
-  void add(const cairn::StampedScan& scan) {
+  void add(const cairn::StampedScan& given) {
+    cairn::StampedScan scan = given;
+    scan.T_odom_laser = seen_from(T_odom_first_, scan.T_odom_laser);
     bool due = scans_.empty();
     if (!due) {
       const SE2 moved = scans_.back().T_odom_laser.inverse() * scan.T_odom_laser;
@@ -160,9 +165,9 @@ public:
       angle_ += std::abs(moved.angle());
       due = distance_ >= options_.step_distance || angle_ >= options_.step_angle;
     }
-    scans_.push_back(scan);
+    scans_.push_back(std::move(scan));
     try {
-      if (due) process(scan);
+      if (due) process(scans_.back());
     } catch (const std::exception&) {  // the belief does not know of the scan
       scans_.pop_back();
       throw;
@@ -173,8 +178,8 @@ public:
   void put_into(Results& r) const {
     r.steps = steps_;
     r.scans = scans_.size();
-    for (const auto& scan : scans_) r.odometry.push_back({scan.time, scan.T_odom_laser});
     const auto path = belief_.path(belief_.best());
+    r.odometry = odometry_from(path.front().pose, scans_);
     const auto filled = [&](const auto& pose) {
       return filled_path(scans_, steps_.size(), [&](std::size_t k) { return steps_[k].scan; }, pose);
     };
@@ -256,6 +261,7 @@ private:
   }
 
   StopMapperOptions options_;
+  SE2 T_odom_first_;  // of the laser, at the first scan
   Belief belief_;
   std::vector<cairn::StampedScan> scans_;
   std::vector<StepRecord> steps_;

@@ -30,6 +30,7 @@ enum class StopStorage { tiles, ancestry };
 enum class StopProposal { motion, match };
 
 struct StopMapperOptions {
+  std::optional<cairn::SE2> start = cairn::SE2();  ///< as MapperOptions::start
   StopStorage storage = StopStorage::ancestry;
   std::size_t particles = 50;
   StopProposal proposal = StopProposal::motion;
