@@ -46,6 +46,7 @@ struct Snapshot {
 template <class Map>
 void put_paths(Snapshot& s, const cairn::MappedPaths<Map>& belief) {
   const auto record = belief.record();
+  s.paths.reserve(record.nodes.size());
   for (const auto& [pose, parent] : record.nodes)
     if (parent < record.nodes.size()) s.paths.push_back({record.nodes[parent].pose.pose, pose.pose});
   for (const auto& pose : belief.path(belief.best())) s.best.push_back(pose.pose);
