@@ -170,8 +170,8 @@ int main(int argc, char** argv) {
       ->type_name("NAME")
       ->default_str("tiles");
   app.add_option("--frame", options.frame,
-                 "of a new map and of the path in it: start, the laser's first pose, wherever odometry "
-                 "begins, or odometry's")
+                 "of a new map and of the path in it: the laser's first pose, wherever odometry begins, or "
+                 "odometry's, which --map stop and ancestry have without being asked")
       ->transform(example::one_of<Frame>({{"odometry", Frame::odometry}, {"start", Frame::start}}))
       ->type_name("NAME")
       ->default_str("start");
@@ -219,6 +219,7 @@ int main(int argc, char** argv) {
       cairn::raise("--frame is for a new map: a loaded one has its own");
     if (!options.load.empty() && options.log.empty() && !options.simulate)
       cairn::raise("--load goes on with a log: expected --log too, or --simulate for the rendered drive");
+    if (app.count("--frame") == 0 && options.map != Maps::tiles) options.frame = Frame::odometry;
     example::expect_not_read(options.save, {options.log, options.relations});
     const Input input = input_of(options);
     std::optional<Mapper> mapper;

@@ -104,6 +104,7 @@ TEST_SUITE("grid_slam/newest_pose") {
       CarmenLog log = drive.log;
       log.scans.resize(280);
       StopMapperOptions options = matching_stops();
+      options.start = SE2();
       options.storage = StopStorage::tiles;
       options.particles = 8;
       options.seed = seed;
