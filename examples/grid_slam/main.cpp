@@ -222,6 +222,7 @@ int main(int argc, char** argv) {
     if (app.count("--frame") == 0 && options.map != Maps::tiles) options.frame = Frame::odometry;
     example::expect_not_read(options.save, {options.log, options.relations});
     const Input input = input_of(options);
+    const example::NoEmptyFolder tidy(options.out);
     std::optional<Mapper> mapper;
     Results results =
         options.map == Maps::tiles ? map_occupancy(options, input, mapper) : map_stops(options, input);

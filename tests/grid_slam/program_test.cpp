@@ -268,6 +268,38 @@ TEST_SUITE("grid_slam/program") {
               .says("outside of the map"));
   }
 
+  TEST_CASE("grid_slam: where no place in the window explains the first scan, no folder is left") {
+    const cairn_test::Folder folder;
+    folder.put("log", short_log(40));
+    std::string round;  // no wall of a corridor
+    for (int scan = 0; scan < 2; ++scan) {
+      round += "FLASER 90";
+      for (int beam = 0; beam < 90; ++beam) round += " 3";
+      const std::string pose = " " + std::to_string(scan) + " 0 0";
+      round += pose + pose + " " + std::to_string(scan) + " h 0\n";
+    }
+    folder.put("round", round);
+    const auto named = [&](const char* name) { return "\"" + (folder / name).string() + "\""; };
+    REQUIRE(
+        run("--particles 2 --log " + named("log") + " --out " + named("mapped") + " --save " + named("map"))
+            .code == 0);
+    fs::create_directory(folder / "there");
+    const auto localise = [&](const char* out) {
+      return run("--load " + named("map") + " --localise --window -3 -3 3 3 --log " + named("round") +
+                 " --out " + named(out));
+    };
+    for (const char* out : {"new", "a/new/one/", "there"}) {
+      CAPTURE(out);
+      const Outcome outcome = localise(out);
+      CAPTURE(outcome.words);
+      CHECK(outcome.code == 2);
+      CHECK(outcome.says("no place in the window explains the first scan"));
+    }
+    CHECK_FALSE(fs::exists(folder / "new"));
+    CHECK_FALSE(fs::exists(folder / "a"));
+    CHECK(fs::is_empty(folder / "there"));
+  }
+
   TEST_CASE("grid_slam: a map too large for a picture is left out with a note, and nothing else is") {
     const cairn_test::Folder folder;
     folder.put("log", short_log(40, 39, 2000));
