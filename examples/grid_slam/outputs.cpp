@@ -314,12 +314,14 @@ void add_proposals(example::Report& page, const Results& r) {
 /// DP-SLAM's tree as it was at each time, now at the right.
 void add_ancestors(example::Report& page, const Results& r) {
   if (r.snapshots.empty() || r.snapshots.back().ancestors.empty()) return;
-  // What is older than every split is one line.
-  double oldest = 1;
-  for (const Snapshot& s : r.snapshots)
+  // As far back as nine tenths of the trees go: some reach back many times as far as the others.
+  std::vector<double> oldest;
+  for (const Snapshot& s : r.snapshots) {
+    oldest.push_back(1);
     for (const Ancestor& a : s.ancestors)
-      if (a.parent) oldest = std::max(oldest, static_cast<double>(s.processed - a.born));
-  const double left = -1.1 * oldest;
+      if (a.parent) oldest.back() = std::max(oldest.back(), static_cast<double>(s.processed - a.born));
+  }
+  const double left = -1.1 * cairn::quantile(oldest, 0.9);
   constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
   struct Age {
     const char* name;
@@ -329,18 +331,19 @@ void add_ancestors(example::Report& page, const Results& r) {
   constexpr Age ages[] = {{"younger than 10 scans", 10, Ink::measurement},
                           {"10 to 99 scans old", 100, Ink::teal},
                           {"older", std::numeric_limits<double>::infinity(), Ink::violet}};
-  example::PlaneFilm film{.title = "The tree of ancestors",
-                          .caption =
-                              "What each particle's map is made of: a line is a stretch of path that the "
-                              "particles to its right have in "
-                              "common, and holds the cells that were written along it. A dot is where it "
-                              "splits, or a particle as it is now. "
-                              "Coloured by how long ago the line began.",
-                          .x = {"processed scans before now", ""},
-                          .y = {"particle", ""},
-                          .slider = {"scan", ""},
-                          .equal_scale = false,
-                          .wide = true};
+  example::PlaneFilm film{
+      .title = "The tree of ancestors",
+      .caption =
+          "What each particle's map is made of: a line is a stretch of path that the "
+          "particles to its right have in common, and holds the cells that were written "
+          "along it. A dot is where it splits, or a particle as it is now. Coloured by how "
+          "long ago the line began; what is farther back than the picture stands at its "
+          "left edge.",
+      .x = {"processed scans before now", ""},
+      .y = {"particle", ""},
+      .slider = {"scan", ""},
+      .equal_scale = false,
+      .wide = true};
   for (const Snapshot& s : r.snapshots) {
     example::PlaneFrame frame{.at = static_cast<double>(s.scans)};
     const auto ago = [&](std::uint64_t step) {
@@ -354,7 +357,7 @@ void add_ancestors(example::Report& page, const Results& r) {
       for (const Ancestor& a : s.ancestors) {
         if (!a.parent) last_common = a.end;
         if (-ago(a.born) >= age.below || -ago(a.born) < above) continue;
-        const double from = a.parent ? ago(a.born) : left, to = ago(a.end);
+        const double from = a.parent ? std::max(left, ago(a.born)) : left, to = std::max(left, ago(a.end));
         const double split = a.parent ? s.ancestors[*a.parent].place : a.place;
         lines.x.insert(lines.x.end(), {from, from, to, nothing});
         lines.y.insert(lines.y.end(), {split + 1, a.place + 1, a.place + 1, nothing});
