@@ -41,7 +41,7 @@ constexpr std::size_t film_frames = 48;  // of the report
 
 struct Options {
   Maps map = Maps::tiles;
-  Frame frame = Frame::odometry;
+  Frame frame = Frame::start;
   StopProposal proposal = StopProposal::motion;
   std::string log, relations;
   bool simulate = false;
@@ -77,6 +77,11 @@ Input input_of(const Options& options) {
   return input;
 }
 
+/// Of the laser in a new map; none: where odometry has it.
+std::optional<cairn::SE2> start_of(const Options& options) {
+  return options.frame == Frame::start ? std::optional(cairn::SE2()) : std::nullopt;
+}
+
 Mapper mapper_of(const Options& options) {
   if (!options.load.empty()) {
     const MapRequest wanted{options.resolution, options.particles, options.seed, options.threads};
@@ -91,7 +96,7 @@ Mapper mapper_of(const Options& options) {
   made.seed = options.seed.value_or(made.seed);
   made.threads = options.threads;
   made.cell_size = options.resolution.value_or(made.cell_size);
-  if (options.frame == Frame::start) made.start = cairn::SE2();
+  made.start = start_of(options);
   return Mapper(made);
 }
 
@@ -107,6 +112,7 @@ std::function<std::optional<std::string>()> watched(example::Progress& progress)
 
 Results map_stops(const Options& options, const Input& input) {
   StopMapperOptions made = options.proposal == StopProposal::match ? matching_stops() : StopMapperOptions{};
+  made.start = start_of(options);
   made.storage = options.map == Maps::ancestry ? StopStorage::ancestry : StopStorage::tiles;
   made.particles = options.particles.value_or(made.particles);
   made.seed = options.seed.value_or(made.seed);
@@ -164,10 +170,11 @@ int main(int argc, char** argv) {
       ->type_name("NAME")
       ->default_str("tiles");
   app.add_option("--frame", options.frame,
-                 "of the map: odometry's, or start, the laser's first pose, wherever odometry begins")
+                 "of a new map and of the path in it: the laser's first pose, wherever odometry begins, or "
+                 "odometry's, which --map stop and ancestry have without being asked")
       ->transform(example::one_of<Frame>({{"odometry", Frame::odometry}, {"start", Frame::start}}))
       ->type_name("NAME")
-      ->default_str("odometry");
+      ->default_str("start");
   app.add_option(
          "--proposal", options.proposal,
          "of --map stop and ancestry: poses drawn from odometry (motion; the covariance of the newest "
@@ -208,12 +215,14 @@ int main(int argc, char** argv) {
       cairn::raise("--save and --load are for --map tiles");
     if (options.map == Maps::tiles && app.count("--proposal") > 0)
       cairn::raise("--proposal is for --map stop and --map ancestry");
-    if (app.count("--frame") > 0 && (options.map != Maps::tiles || !options.load.empty()))
-      cairn::raise("--frame is for a new map of --map tiles");
+    if (app.count("--frame") > 0 && !options.load.empty())
+      cairn::raise("--frame is for a new map: a loaded one has its own");
     if (!options.load.empty() && options.log.empty() && !options.simulate)
       cairn::raise("--load goes on with a log: expected --log too, or --simulate for the rendered drive");
+    if (app.count("--frame") == 0 && options.map != Maps::tiles) options.frame = Frame::odometry;
     example::expect_not_read(options.save, {options.log, options.relations});
     const Input input = input_of(options);
+    const example::NoEmptyFolder tidy(options.out);
     std::optional<Mapper> mapper;
     Results results =
         options.map == Maps::tiles ? map_occupancy(options, input, mapper) : map_stops(options, input);

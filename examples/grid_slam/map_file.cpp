@@ -82,7 +82,7 @@ void parts(Archive& archive, Asked& a) {
 namespace {
 
 constexpr std::string_view kind = "cairngrd";
-constexpr std::uint64_t version = 5;
+constexpr std::uint64_t version = 6;
 
 /// Grids that share tiles: every tile once, and for each grid the numbers of its own.
 template <class Cell>
@@ -172,7 +172,7 @@ void Mapper::plain_parts(Archive& archive, Mapper& m) {
   archive(m.steps_, m.points_, m.travelled_, m.scans_, m.loops_);
   archive(m.motion_.distance, m.motion_.angle, m.motion_.stood, m.delay_);
   archive(m.looked_, m.asked_);
-  archive(m.unseen_.still_since, m.unseen_.steps, m.unseen_.newest);
+  archive(m.unseen_.still_since, m.unseen_.steps, m.unseen_.newest, m.T_odom_first_);
 }
 
 void Mapper::expect_sound(const Reader& reader) const {
@@ -197,6 +197,7 @@ void Mapper::expect_sound(const Reader& reader) const {
     expect_place(reader, step.pose.mean);
     expect_covariance(reader, step.pose.covariance);
   }
+  expect_place(reader, T_odom_first_);
   for (const cairn::StampedScan& scan : scans_) {
     expect_place(reader, scan.T_odom_laser);
     expect_place(reader, scan.T_odom_robot);

@@ -23,6 +23,7 @@
 #include <cairn/scan/match.hpp>
 
 #include "filled_path.hpp"
+#include "odometry_frame.hpp"
 #include "room.hpp"
 
 namespace grid_slam {
@@ -138,13 +139,16 @@ cairn::Gaussian<SE2> Mapper::newest() const {
   return pose;
 }
 
-bool Mapper::add(const cairn::StampedScan& scan) {
+bool Mapper::add(const cairn::StampedScan& given) {
+  cairn::StampedScan scan = given;
+  if (scans_.empty()) T_odom_first_ = scan.T_odom_laser;
+  scan.T_odom_laser = seen_from(T_odom_first_, scan.T_odom_laser);
   const Motion before = motion_;
   const Unseen unseen_before = unseen_;
   const std::size_t steps = steps_.size();
   bool due = scans_.empty(), stopped = false;
   if (due) {
-    begin(scan);
+    begin(scan.scan);
   } else {
     const SE2 moved = scans_.back().T_odom_laser.inverse() * scan.T_odom_laser;
     accumulate(moved);
@@ -155,11 +159,11 @@ bool Mapper::add(const cairn::StampedScan& scan) {
     if (!due && stopped) motion_.stood = true;
     if (!is_still(moved)) unseen_.still_since = scans_.size();
   }
-  scans_.push_back(scan);
+  scans_.push_back(std::move(scan));
   const bool stuck = !due && odometry_is_stuck();
   due = due || stuck;
   try {
-    if (due) process(scan, stopped, stuck);
+    if (due) process(scans_.back(), stopped, stuck);
   } catch (const std::exception&) {
     if (steps_.size() == steps) {  // the belief does not know of the scan
       scans_.pop_back();
@@ -189,13 +193,13 @@ bool Mapper::odometry_is_stuck() const {
   return share_of_changed(scans_[then].scan, scans_.back().scan) > many;
 }
 
-void Mapper::begin(const cairn::StampedScan& scan) {
+void Mapper::begin(const cairn::LaserScan& scan) {
   travelled_.push_back(0);
   if (window_) start_ = place_in_window(scan);
   if (frozen_)
     belief_.emplace(start_->mean, *frozen_, options_.particles);
   else
-    belief_.emplace(options_.start.value_or(scan.T_odom_laser), empty_map(), options_.particles);
+    belief_.emplace(options_.start.value_or(T_odom_first_), empty_map(), options_.particles);
 }
 
 Mapper Mapper::localiser(const std::filesystem::path& path, const MapRequest& wanted,
@@ -237,11 +241,11 @@ Mapper Mapper::localiser(const std::filesystem::path& path, const MapRequest& wa
   return mapper;
 }
 
-cairn::Gaussian<SE2> Mapper::place_in_window(const cairn::StampedScan& scan) {
+cairn::Gaussian<SE2> Mapper::place_in_window(const cairn::LaserScan& scan) {
   const double x = 0.5 * (window_->left + window_->right), y = 0.5 * (window_->bottom + window_->top);
   const double half_x = window_->right - x, half_y = window_->top - y;
   std::vector<ScanPoint> near;
-  for (const ScanPoint& p : cairn::scan_points(scan.scan))
+  for (const ScanPoint& p : cairn::scan_points(scan))
     if (std::hypot(p.x, p.y) < first_view) near.push_back(p);
   const cairn::OccupancyGrid& grid = frozen_->grid;
   const cairn::CorrelativeSearch search(scores_around(grid, x, y, std::max(half_x, half_y) + first_view), 6);

@@ -66,9 +66,9 @@ struct LoopOptions {
 };
 
 struct MapperOptions {
-  /// Of the laser in the map: odometry's first where there is none. The same for all logs, what comes out
-  /// does not depend on where odometry has its origin.
-  std::optional<cairn::SE2> start{};
+  /// Of the laser in the map; none: where odometry has it. From a pose that is the same for all logs, what
+  /// comes out does not depend on where odometry has its origin.
+  std::optional<cairn::SE2> start = cairn::SE2();
   std::size_t particles = 30;
   std::uint64_t seed = 1;
   unsigned threads = 1;
@@ -152,6 +152,7 @@ public:
   bool add(const cairn::StampedScan& scan);
 
   [[nodiscard]] const MapperOptions& options() const noexcept { return options_; }
+  /// Those taken so far, their poses of the laser seen from the first one.
   [[nodiscard]] const std::vector<cairn::StampedScan>& scans() const noexcept { return scans_; }
   [[nodiscard]] const std::vector<StepRecord>& steps() const noexcept { return steps_; }
   [[nodiscard]] const std::vector<Loop>& loops() const noexcept { return loops_; }
@@ -199,8 +200,8 @@ private:
   static void plain_parts(Archive& archive, Mapper& mapper);
   [[nodiscard]] static Mapper loaded(example::Reader& reader, const MapRequest& wanted);
   void expect_sound(const example::Reader& reader) const;  // of what was read, but for map and paths
-  void begin(const cairn::StampedScan& scan);
-  [[nodiscard]] cairn::Gaussian<cairn::SE2> place_in_window(const cairn::StampedScan& scan);
+  void begin(const cairn::LaserScan& scan);
+  [[nodiscard]] cairn::Gaussian<cairn::SE2> place_in_window(const cairn::LaserScan& scan);
   void accumulate(const cairn::SE2& moved);
   /// Whether odometry moved too little for a robot on its way, from the scan before. Copies of a scan do not
   /// tell, so the scan before is one of another time.
@@ -252,7 +253,8 @@ private:
   std::vector<StepRecord> steps_;
   std::vector<std::vector<cairn::ScanPoint>> points_;  // of the processed scans
   std::vector<double> travelled_;                      // [m] at each pose of the path
-  std::vector<cairn::StampedScan> scans_;
+  cairn::SE2 T_odom_first_;                            // of the laser, at the first scan
+  std::vector<cairn::StampedScan> scans_;              // of poses seen from there
   std::vector<Loop> loops_;
   Motion motion_;
   Unseen unseen_;

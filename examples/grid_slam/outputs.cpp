@@ -12,6 +12,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include <cairn/core/statistics.hpp>
 #include <cairn/io/file.hpp>
 #include <cairn/io/netpbm.hpp>
 #include <cairn/io/text.hpp>
@@ -233,22 +234,145 @@ void add_spread(example::Report& page, const Results& r) {
 
 void add_memory(example::Report& page, const Results& r) {
   if (r.snapshots.empty()) return;
-  std::vector<double> step, shared, separate;
+  std::vector<double> step, held, as_tiles, separate;
   for (const Snapshot& s : r.snapshots) {
     step.push_back(static_cast<double>(s.processed));
-    shared.push_back(static_cast<double>(s.bytes) / 1048576.0);
+    held.push_back(static_cast<double>(s.bytes) / 1048576.0);
+    as_tiles.push_back(static_cast<double>(s.tile_bytes) / 1048576.0);
     separate.push_back(static_cast<double>(s.separate_bytes) / 1048576.0);
   }
-  std::vector<example::Curve> curves{{"held", Ink::belief, shared}};
-  if (separate.back() > 0) curves.push_back({"if each had its own", Ink::grey, separate});
+  const bool is_tree = r.snapshots.back().tile_bytes > 0;
+  std::vector<example::Curve> curves{{is_tree ? "held: a tree" : "held: shared tiles", Ink::belief, held}};
+  if (is_tree) curves.push_back({"if they were shared tiles", Ink::violet, as_tiles});
+  curves.push_back({"if each particle had its own", Ink::grey, separate});
+  const std::string shared =
+      "All particles' maps together: what several particles have in common is held once";
   page.add(example::LinePlot{
       .title = "Memory of the maps",
-      .caption = "All particles' maps together: what several particles have in common is held once.",
+      .caption =
+          shared + (is_tree ? ", cell by cell in a tree of ancestors, or tile by tile." : ", tile by tile."),
       .x = {"processed scan", ""},
       .y = {"memory", "MB"},
       .x_values = step,
       .curves = curves,
       .logarithmic = true});
+}
+
+/// Where the pose of a scan may be before it is drawn, at places so far apart that the ellipses do not cover
+/// each other.
+void add_proposals(example::Report& page, const Results& r) {
+  if (r.drawn_from.empty()) return;
+  constexpr double sigmas = 3;
+  std::vector<double> along;  // the longer half axes [m]
+  double left = r.drawn_from.front().mean.x(), bottom = r.drawn_from.front().mean.y(), right = left,
+         top = bottom;
+  for (const auto& q : r.drawn_from) {
+    const double middle = 0.5 * (q.covariance(0, 0) + q.covariance(1, 1));
+    along.push_back(sigmas * std::sqrt(middle + std::hypot(middle - q.covariance(1, 1), q.covariance(0, 1))));
+    left = std::min(left, q.mean.x());
+    right = std::max(right, q.mean.x());
+    bottom = std::min(bottom, q.mean.y());
+    top = std::max(top, q.mean.y());
+  }
+  // From one to the next the tenth longest nearly meet, in a factor of one digit.
+  const double apart = 0.07 * std::max({right - left, top - bottom, 1.0});
+  const double most = std::max(1.0, 0.5 * apart / std::max(cairn::quantile(along, 0.9), 1e-6));
+  const double decade = std::pow(10.0, std::floor(std::log10(most)));
+  const double scale = decade * std::floor(most / decade);
+  example::PlaneCurve ellipses{
+      .name = "3 sigma, " + readable(scale) + " times as large", .ink = Ink::violet, .filled = true};
+  std::vector<cairn::Vector<2>> drawn;
+  for (const auto& q : r.drawn_from) {
+    const cairn::Vector<2> at = q.mean.translation();
+    if (std::ranges::any_of(drawn, [&](const auto& other) { return (other - at).norm() < apart; })) continue;
+    drawn.push_back(at);
+    const cairn::Matrix<2> R = q.mean.rotation().matrix();
+    const cairn::Matrix<2> spread =
+        R * q.covariance.topLeftCorner<2, 2>() * R.transpose();  // of the map's axes
+    const auto one = example::ellipse(ellipses.name, ellipses.ink, {at(0), at(1)},
+                                      {spread(0, 0), spread(0, 1), spread(1, 1)}, sigmas * scale);
+    for (auto [all, own] : {std::pair{&ellipses.x, &one.x}, std::pair{&ellipses.y, &one.y}}) {
+      all->insert(all->end(), own->begin(), own->end());
+      all->push_back(std::numeric_limits<double>::quiet_NaN());  // between two of them no line
+    }
+  }
+  const std::string by_scans =
+      "Where the pose of a scan may be, by odometry and the scan together, before it is drawn: long along a "
+      "corridor, "
+      "whose walls say nothing of the way along it.";
+  const std::string by_motion =
+      "Where the pose of a scan may be by odometry, before it is drawn and weighed by the scan.";
+  page.add(example::PlanePlot{.title = "Spread of the proposal",
+                              .caption = (r.drawn_by_scans ? by_scans : by_motion) +
+                                         " Ellipses of 3 sigma, drawn " + readable(scale) +
+                                         " times as large, at the first visit of a place.",
+                              .x = {"x", "m"},
+                              .y = {"y", "m"},
+                              .curves = {curve_of("path", Ink::grey, r.means), ellipses}});
+}
+
+/// DP-SLAM's tree as it was at each time, now at the right.
+void add_ancestors(example::Report& page, const Results& r) {
+  if (r.snapshots.empty() || r.snapshots.back().ancestors.empty()) return;
+  // As far back as nine tenths of the trees go: some reach back many times as far as the others.
+  std::vector<double> oldest;
+  for (const Snapshot& s : r.snapshots) {
+    oldest.push_back(1);
+    for (const Ancestor& a : s.ancestors)
+      if (a.parent) oldest.back() = std::max(oldest.back(), static_cast<double>(s.processed - a.born));
+  }
+  const double left = -1.1 * cairn::quantile(oldest, 0.9);
+  constexpr double nothing = std::numeric_limits<double>::quiet_NaN();
+  struct Age {
+    const char* name;
+    double below;  // processed scans
+    Ink ink;
+  };
+  constexpr Age ages[] = {{"younger than 10 scans", 10, Ink::measurement},
+                          {"10 to 99 scans old", 100, Ink::teal},
+                          {"older", std::numeric_limits<double>::infinity(), Ink::violet}};
+  example::PlaneFilm film{
+      .title = "The tree of ancestors",
+      .caption =
+          "What each particle's map is made of: a line is a stretch of path that the "
+          "particles to its right have in common, and holds the cells that were written "
+          "along it. A dot is where it splits, or a particle as it is now. Coloured by how "
+          "long ago the line began; what is farther back than the picture stands at its "
+          "left edge.",
+      .x = {"processed scans before now", ""},
+      .y = {"particle", ""},
+      .slider = {"scan", ""},
+      .equal_scale = false,
+      .wide = true};
+  for (const Snapshot& s : r.snapshots) {
+    example::PlaneFrame frame{.at = static_cast<double>(s.scans)};
+    const auto ago = [&](std::uint64_t step) {
+      return static_cast<double>(step) - static_cast<double>(s.processed);
+    };
+    std::size_t last_common = 0;
+    for (const Age& age : ages) {
+      example::PlaneCurve lines{.name = age.name, .ink = age.ink},
+          dots{.name = age.name, .ink = age.ink, .dots = true};
+      const double above = &age == ages ? -1 : (&age - 1)->below;
+      for (const Ancestor& a : s.ancestors) {
+        if (!a.parent) last_common = a.end;
+        if (-ago(a.born) >= age.below || -ago(a.born) < above) continue;
+        const double from = a.parent ? std::max(left, ago(a.born)) : left, to = std::max(left, ago(a.end));
+        const double split = a.parent ? s.ancestors[*a.parent].place : a.place;
+        lines.x.insert(lines.x.end(), {from, from, to, nothing});
+        lines.y.insert(lines.y.end(), {split + 1, a.place + 1, a.place + 1, nothing});
+        dots.x.push_back(to);
+        dots.y.push_back(a.place + 1);
+      }
+      frame.curves.push_back(std::move(lines));
+      frame.curves.push_back(std::move(dots));
+    }
+    frame.caption = std::to_string(s.ancestors.size()) + " ancestors; what all have in common ends " +
+                    std::to_string(s.processed - last_common) + " scans ago, effective number of particles " +
+                    readable(s.effective_size);
+    film.frames.push_back(std::move(frame));
+  }
+  page.add(film);
 }
 
 void add_errors(example::Report& page, const Results& r) {
@@ -370,8 +494,10 @@ std::optional<std::string> report(const Results& r) {
       .x = {"x", "m"},
       .y = {"y", "m"},
       .curves = {curve_of("odometry", Ink::wrong, r.odometry), curve_of("path", Ink::belief, r.means)}});
+  add_proposals(page, r);
   add_spread(page, r);
   add_memory(page, r);
+  add_ancestors(page, r);
   add_errors(page, r);
   return page.html();
 }

@@ -20,6 +20,7 @@
 #include <cairn/manifold/se2.hpp>
 #include <cairn/scan/occupancy_grid.hpp>
 
+#include "ancestors.hpp"
 #include "map_image.hpp"
 #include "mapper.hpp"
 
@@ -40,12 +41,15 @@ struct Snapshot {
   std::vector<std::array<cairn::SE2, 2>> paths{};      ///< steps of all particles' paths, each once
   std::vector<cairn::SE2> best{};                      ///< the best particle's path
   std::size_t bytes = 0;                               ///< as map_bytes()
-  std::size_t separate_bytes = 0;                      ///< if no particle shared anything; 0: not known
+  std::size_t separate_bytes = 0;                      ///< if no particle shared anything
+  std::size_t tile_bytes = 0;         ///< of a tree of ancestors: if they were shared tiles instead
+  std::vector<Ancestor> ancestors{};  ///< of a tree of ancestors
 };
 /// Puts in all particles' paths and the best one's.
 template <class Map>
 void put_paths(Snapshot& s, const cairn::MappedPaths<Map>& belief) {
   const auto record = belief.record();
+  s.paths.reserve(record.nodes.size());
   for (const auto& [pose, parent] : record.nodes)
     if (parent < record.nodes.size()) s.paths.push_back({record.nodes[parent].pose.pose, pose.pose});
   for (const auto& pose : belief.path(belief.best())) s.best.push_back(pose.pose);
@@ -60,6 +64,9 @@ struct Results {
   std::vector<Loop> loops;
   std::vector<PossiblePlace> places;  ///< where a localiser may have begun, the one taken first
   std::vector<cairn::StampedPose2> odometry, drawn, means, rematched;
+  std::vector<cairn::Gaussian<cairn::SE2>>
+      drawn_from;              ///< by the best particle's path, a processed scan each
+  bool drawn_by_scans = true;  ///< those know of the scan, not of odometry alone
   std::optional<cairn::RelationError> of_odometry, of_drawn, of_means, of_rematched;
   cairn::Gaussian<cairn::SE2> newest;
   bool newest_has_path = true;  ///< its covariance has what the path gathered, not the particles' alone

@@ -84,6 +84,8 @@ Results run(Mapper& mapper, const cairn::CarmenLog& log, const std::vector<cairn
   r.odometry = odometry_from(r.drawn.front().pose, mapper.scans());
   r.means = mapper.trajectory(true);
   r.rematched = mapper.rematched();
+  for (const auto& pose : mapper.belief().path(mapper.belief().best()))
+    if (pose.step > 0) r.drawn_from.push_back(pose.drawn_from);
   r.newest = mapper.newest();
   r.newest_has_path = !mapper.localises();
   r.delay = mapper.delay().mean();

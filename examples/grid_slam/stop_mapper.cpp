@@ -18,6 +18,7 @@
 #include "filled_path.hpp"
 #include "loop_closing.hpp"
 #include "map_image.hpp"
+#include "odometry_frame.hpp"
 #include "room.hpp"
 #include "run.hpp"
 
@@ -132,15 +133,20 @@ std::size_t bytes_of(const cairn::MappedPaths<Map>& belief) {
   }
 }
 
-/// The same if no particle shared anything; 0 of a tree, which has no maps that could be told apart.
+/// Puts in what the stops would take otherwise, and of a tree who its nodes are.
 template <class Map>
-std::size_t separate_bytes_of(const cairn::MappedPaths<Map>& belief) {
-  std::size_t bytes = 0;
-  if constexpr (!requires { belief[0].map.stops().cells().bytes(); })
+void put_memory(Snapshot& s, const cairn::MappedPaths<Map>& belief) {
+  if constexpr (requires { belief[0].map.stops().cells().as_tiles(); }) {
+    const auto tiles = belief[0].map.stops().cells().as_tiles();
+    constexpr std::size_t bytes = sizeof(cairn::SharedTiles<StopCell>::Tile);
+    s.tile_bytes = bytes * tiles.shared;
+    s.separate_bytes = bytes * tiles.separate;
+    s.ancestors = ancestors_of(belief.record());
+  } else {
     for (std::size_t i = 0; i < belief.size(); ++i)
       belief[i].map.stops().cells().for_each_tile(
-          [&](cairn::TileAddress, const auto& tile) { bytes += sizeof tile; });
-  return bytes;
+          [&](cairn::TileAddress, const auto& tile) { s.separate_bytes += sizeof tile; });
+  }
 }
 
 template <class Map>
@@ -148,10 +154,14 @@ class StopMapper {
 public:
   using Belief = cairn::MappedPaths<Map>;
 
-  StopMapper(const SE2& start, const StopMapperOptions& options)
-      : options_(options), belief_(start, Map::empty(options), options.particles) {}
+  StopMapper(const SE2& T_odom_first, const StopMapperOptions& options)
+      : options_(options),
+        T_odom_first_(T_odom_first),
+        belief_(options.start.value_or(T_odom_first), Map::empty(options), options.particles) {}
 
-  void add(const cairn::StampedScan& scan) {
+  void add(const cairn::StampedScan& given) {
+    cairn::StampedScan scan = given;
+    if (options_.start) scan.T_odom_laser = seen_from(T_odom_first_, scan.T_odom_laser);
     bool due = scans_.empty();
     if (!due) {
       const SE2 moved = scans_.back().T_odom_laser.inverse() * scan.T_odom_laser;
@@ -160,9 +170,9 @@ public:
       angle_ += std::abs(moved.angle());
       due = distance_ >= options_.step_distance || angle_ >= options_.step_angle;
     }
-    scans_.push_back(scan);
+    scans_.push_back(std::move(scan));
     try {
-      if (due) process(scan);
+      if (due) process(scans_.back());
     } catch (const std::exception&) {  // the belief does not know of the scan
       scans_.pop_back();
       throw;
@@ -173,8 +183,8 @@ public:
   void put_into(Results& r) const {
     r.steps = steps_;
     r.scans = scans_.size();
-    for (const auto& scan : scans_) r.odometry.push_back({scan.time, scan.T_odom_laser});
     const auto path = belief_.path(belief_.best());
+    r.odometry = odometry_from(path.front().pose, scans_);
     const auto filled = [&](const auto& pose) {
       return filled_path(scans_, steps_.size(), [&](std::size_t k) { return steps_[k].scan; }, pose);
     };
@@ -183,6 +193,9 @@ public:
     r.means =
         scans_are_matched() ? filled([&](std::size_t k) { return path[k + 1].drawn_from.mean; }) : r.drawn;
     r.rematched = r.means;
+    for (const auto& pose : path)
+      if (pose.step > 0) r.drawn_from.push_back(pose.drawn_from);
+    r.drawn_by_scans = scans_are_matched();
     r.newest = newest();
     r.newest_has_path = scans_are_matched();
     r.map = map_picture();
@@ -200,8 +213,8 @@ public:
                .effective_size = steps_.back().effective_size,
                .newest = newest().covariance,
                .map = PackedMap(map_picture()),
-               .bytes = bytes_of(belief_),
-               .separate_bytes = separate_bytes_of(belief_)};
+               .bytes = bytes_of(belief_)};
+    put_memory(s, belief_);
     put_paths(s, belief_);
     return s;
   }
@@ -256,6 +269,7 @@ private:
   }
 
   StopMapperOptions options_;
+  SE2 T_odom_first_;  // of the laser, at the first scan
   Belief belief_;
   std::vector<cairn::StampedScan> scans_;
   std::vector<StepRecord> steps_;

@@ -30,6 +30,8 @@ enum class StopStorage { tiles, ancestry };
 enum class StopProposal { motion, match };
 
 struct StopMapperOptions {
+  /// As MapperOptions::start. None: by luck, more runs over ACES keep together so (docs/grid.md).
+  std::optional<cairn::SE2> start{};
   StopStorage storage = StopStorage::ancestry;
   std::size_t particles = 50;
   StopProposal proposal = StopProposal::motion;

@@ -124,6 +124,7 @@ std::string png_bytes(cairn::ImageView image) {
                  std::to_string(image.height()) + " pixels (" +
                  (image.empty() ? "it has none" : png.image.message) + ")");
   bytes.resize(size);
+  bytes.shrink_to_fit();  // the room was for the worst image: of a floor plan it is ten times the file
   return bytes;
 }
 

@@ -298,6 +298,22 @@ void ResultFolder::replace(const std::function<void(const fs::path& staging)>& f
   deliver(folder / complete_inside, folder, names_);
 }
 
+NoEmptyFolder::NoEmptyFolder(const fs::path& folder) {
+  std::error_code failure;
+  fs::path path = fs::absolute(folder, failure).lexically_normal();
+  if (!path.has_filename()) path = path.parent_path();  // "out/"
+  for (; !failure && !fs::exists(fs::symlink_status(path, failure)) && path.has_relative_path();
+       path = path.parent_path()) {
+    missing_.push_back(path);
+    failure.clear();  // that it is missing is no failure
+  }
+}
+
+NoEmptyFolder::~NoEmptyFolder() {
+  for (const fs::path& folder : missing_)
+    if (::rmdir(folder.c_str()) != 0) return;  // not empty, or never made
+}
+
 void expect_not_read(const fs::path& save, const std::vector<fs::path>& read) {
   for (const fs::path& file : read)
     if (same_file(save, file))

@@ -43,6 +43,19 @@ private:
   std::vector<std::string> names_;
 };
 
+/// Removes, when it goes, the folders that were missing when it came, where nothing stands in them: a run
+/// that made its folder before the work and then fails leaves none.
+class NoEmptyFolder {
+public:
+  explicit NoEmptyFolder(const std::filesystem::path& folder);
+  ~NoEmptyFolder();
+  NoEmptyFolder(const NoEmptyFolder&) = delete;
+  NoEmptyFolder& operator=(const NoEmptyFolder&) = delete;
+
+private:
+  std::vector<std::filesystem::path> missing_;  // each in the next
+};
+
 /// Throws cairn::Error where the file that is to be written by --save is one of those that the run reads. Any
 /// of them may be empty.
 void expect_not_read(const std::filesystem::path& save, const std::vector<std::filesystem::path>& read);

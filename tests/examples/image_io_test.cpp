@@ -75,6 +75,12 @@ TEST_SUITE("image_io") {
     }
   }
 
+  TEST_CASE("image_io: the bytes of a PNG take no more room than they are") {
+    const std::string plain = example::png_bytes(cairn::Image(800, 600, 205));
+    CHECK(plain.size() < 10000);
+    CHECK(plain.capacity() < 2 * plain.size());
+  }
+
   TEST_CASE("image_io: colour becomes luminance and grey stays grey") {
     const cairn_test::Folder folder;
     const std::vector<std::uint8_t> rgb{255, 0, 0, 0, 255, 0, 0, 0, 255, 90, 90, 90};

@@ -19,7 +19,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const cairn_fuzz::Scratch scratch;
   cairn::BinaryWriter numbers;
   for (std::size_t i = 0; i < size; ++i) numbers.put(data[i]);
-  const auto path = scratch.put("map", numbers.file("cairngrd", 5));
+  const auto path = scratch.put("map", numbers.file("cairngrd", 6));
   try {
     grid_slam::Mapper mapper = grid_slam::Mapper::loaded(path);
     mapper.save(scratch / "again");

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <set>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -100,6 +101,15 @@ TEST_SUITE("grid/ancestry") {
       }
       REQUIRE(trees[0].nodes() <= 2 * particles - 1);
       REQUIRE(trees[0].consistent());
+      std::set<const void*> shared;
+      std::size_t separate = 0;
+      for (const SharedTiles<Cell>& grid : tiles)
+        grid.for_each_tile([&](TileAddress, const auto& tile) {
+          shared.insert(&tile);
+          ++separate;
+        });
+      REQUIRE(trees[0].as_tiles().shared == shared.size());
+      REQUIRE(trees[0].as_tiles().separate == separate);
     }
     for (std::size_t i = 0; i < particles; ++i) {
       REQUIRE(written<Cell>(trees[i]) == plain[i]);

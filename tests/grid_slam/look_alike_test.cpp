@@ -125,17 +125,22 @@ TEST_SUITE("grid_slam/look_alike") {
     LoopOptions any;
     any.still_alike = 2;  // no place has twice the best one's score
     double worst_of_any = 0;
-    for (const std::uint64_t seed : {std::uint64_t{1}, std::uint64_t{3}}) {
+    std::size_t unrefused = 0, among_columns = 0;
+    for (std::uint64_t seed = 1; seed <= 6; ++seed) {
       CAPTURE(seed);
       const Lap lap = lap_of_seed(seed);
       const Outcome refused = mapped(lap, {});
-      CHECK(refused.before_the_corner > period);  // more than a column astray
-      CHECK(refused.loops_among_columns == 0);
-      CHECK(refused.at_end < 0.3);
+      CHECK(refused.before_the_corner > 0.9 * period);  // a column astray, as odometry is
+      CHECK(refused.at_end < 0.6);
+      if (seed == 1) CHECK(refused.at_end < 0.15);
+      unrefused += refused.loops_among_columns;
       const Outcome taken = mapped(lap, any);
       CHECK(taken.loops_among_columns > 0);
+      among_columns += taken.loops_among_columns;
       worst_of_any = std::max(worst_of_any, taken.at_end);
     }
+    // Now and then a place has no second one by luck.
+    CHECK(8 * unrefused < among_columns);
     // The best of many is the right one or another, by luck, and then the corner comes too late.
     CHECK(worst_of_any > 1);
   }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -63,7 +64,7 @@ std::string numbers_of(const std::filesystem::path& map) {
 std::string map_of(const std::string& numbers) {
   cairn::BinaryWriter out;
   for (const char c : numbers) out.put(c);
-  return out.file("cairngrd", 5);
+  return out.file("cairngrd", 6);
 }
 
 }  // namespace
@@ -205,8 +206,9 @@ TEST_SUITE("grid_slam/map_file") {
     mapper.add(simulated_drive({.seed = 2}).log.scans.front());
     mapper.save(folder / "map");
     std::string numbers = numbers_of(folder / "map");
-    // They stand before two numbers on looks for loops and three on steps that odometry did not see.
-    const std::size_t at = numbers.size() - 17 - 1 - 8 - 8 * ScanDelay::count;
+    // They stand before two numbers on looks for loops, three on steps that odometry did not see and the pose
+    // by odometry where the map begins.
+    const std::size_t at = numbers.size() - 24 - 17 - 1 - 8 - 8 * ScanDelay::count;
     double share = 0, sum = 0;
     for (std::size_t k = 0; k < ScanDelay::count; ++k) {
       std::memcpy(&share, numbers.data() + at + 8 * k, 8);
@@ -238,7 +240,7 @@ TEST_SUITE("grid_slam/map_file") {
       return scan;
     };
     const cairn_test::Folder folder;
-    Mapper mapper({.particles = 2});
+    Mapper mapper({.start = std::nullopt, .particles = 2});  // in the room's frame
     for (int i = 0; i <= 20; ++i) mapper.add(seen_from(SE2(-1 + 0.1 * i, 0.3, 0.05 * i)));
     mapper.save(folder / "map");
     const cairn::StampedScan first = seen_from(SE2(0.8, 0.5, 0.4));

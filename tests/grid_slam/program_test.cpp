@@ -3,7 +3,9 @@
 //
 // The program as a user meets it: its exit code, its words and what it leaves behind.
 #include <algorithm>
+#include <cmath>
 #include <csignal>
+#include <cstdio>
 #include <filesystem>
 #include <set>
 #include <string>
@@ -39,8 +41,9 @@ std::set<std::string> results() {
 }
 
 /// The first scans of a rendered drive as a CARMEN log; at scan `jump` odometry is elsewhere, by so many
-/// metres. Mirrored, beams run clockwise.
-std::string short_log(std::size_t scans, std::size_t jump = 0, double by = 0, bool mirrored = false) {
+/// metres. Mirrored, beams run clockwise. Odometry has its origin at `origin`.
+std::string short_log(std::size_t scans, std::size_t jump = 0, double by = 0, bool mirrored = false,
+                      const cairn::SE2& origin = {}) {
   const grid_slam::Drive drive = grid_slam::simulated_drive({.seed = 3});
   std::string text;
   for (std::size_t i = 0; i < scans; ++i) {
@@ -49,9 +52,9 @@ std::string short_log(std::size_t scans, std::size_t jump = 0, double by = 0, bo
     std::vector<float> ranges = s.scan.range;
     if (mirrored) std::ranges::reverse(ranges);
     for (const float r : ranges) text += " " + cairn::shortest(r);
+    const cairn::SE2 at = origin * s.T_odom_laser;
     for (int twice = 0; twice < 2; ++twice)
-      for (const double n : {s.T_odom_laser.x() + (jump > 0 && i == jump ? by : 0), s.T_odom_laser.y(),
-                             s.T_odom_laser.angle()})
+      for (const double n : {at.x() + (jump > 0 && i == jump ? by : 0), at.y(), at.angle()})
         text += " " + cairn::shortest(n);
     text += " " + cairn::shortest(s.time) + " host 0\n";
   }
@@ -77,8 +80,8 @@ TEST_SUITE("grid_slam/program") {
         {"--nonsense", "--particles 0", "--threads 0", "--seed -1", "--log " + named("none"),
          "--log " + named("empty"), "--log " + named("torn"), "--log " + named("nan"),
          "--log " + named("still"), "--log " + named("log") + " --relations " + named("log"),
-         "--simulate --log " + named("log"), "--frame nowhere", "--frame start --map stop",
-         "--frame start --load " + named("log"), "--log " + named("log") + " --save " + named("log")},
+         "--simulate --log " + named("log"), "--frame nowhere", "--frame start --load " + named("log"),
+         "--log " + named("log") + " --save " + named("log")},
         300);
     CHECK_FALSE(fs::exists(folder / "out"));
     CHECK(cairn::read_file(folder / "log") == short_log(3));
@@ -115,21 +118,52 @@ TEST_SUITE("grid_slam/program") {
     CHECK(std::count(path.begin(), path.end(), '\n') == 150);
   }
 
-  TEST_CASE("grid_slam: a map of --frame start begins at the laser's first pose, wherever odometry does") {
+  TEST_CASE(
+      "grid_slam: a log turned and shifted has the same map and path, which begin at the laser's first "
+      "pose") {
     const cairn_test::Folder folder;
-    folder.put("log", short_log(40));
-    const auto begin = [&](const std::string& frame) {
-      const std::string out = (folder / frame).string();
-      const Outcome outcome = run("--particles 2 --frame " + frame + " --log \"" + (folder / "log").string() +
-                                  "\" --out \"" + out + "\"");
+    folder.put("log", short_log(150));
+    folder.put("moved", short_log(150, 0, 0, false, {123.4, -56.7, 1.1}));
+    for (const std::string map : {"tiles", "stop --frame start", "ancestry --frame start"}) {
+      CAPTURE(map);
+      for (const char* log : {"log", "moved"}) {
+        const Outcome outcome = run("--particles 4 --map " + map + " --log \"" + (folder / log).string() +
+                                    "\" --out \"" + (folder / "of" / log).string() + "\"");
+        CAPTURE(outcome.words);
+        REQUIRE(outcome.code == 0);
+      }
+      for (const char* name : {"map.pgm", "map.yaml", "trajectory.txt"})
+        CHECK(cairn::read_file(folder / "of" / "log" / name) ==
+              cairn::read_file(folder / "of" / "moved" / name));
+      // DP-SLAM draws its first poses within millimetres of the start.
+      const auto path = cairn::read_tum(folder / "of" / "log" / "trajectory.txt");
+      CHECK(path.front().T_world_body.log().norm() < (map.starts_with("tiles") ? 1e-9 : 0.005));
+    }
+  }
+
+  TEST_CASE(
+      "grid_slam: with --frame odometry, as DP-SLAM's without, map and path are where odometry has its "
+      "origin") {
+    const cairn_test::Folder folder;
+    const cairn::SE2 origin(123.4, -56.7, 1.1);
+    folder.put("log", short_log(40, 0, 0, false, origin));
+    const cairn::SE2 by_log = origin * grid_slam::simulated_drive({.seed = 3}).log.scans.front().T_odom_laser;
+    for (const std::string map : {"tiles --frame odometry", "stop", "ancestry"}) {
+      CAPTURE(map);
+      const Outcome outcome = run("--particles 2 --map " + map + " --log \"" + (folder / "log").string() +
+                                  "\" --out \"" + (folder / "out").string() + "\"");
       CAPTURE(outcome.words);
       REQUIRE(outcome.code == 0);
-      return cairn::read_tum(folder / frame / "trajectory.txt").front().T_world_body;
-    };
-    const cairn::SE3 start = begin("start"), odometry = begin("odometry");
-    CHECK(start.log().norm() < 1e-9);
-    const cairn::SE2 by_log = grid_slam::simulated_drive({.seed = 3}).log.scans.front().T_odom_laser;
-    CHECK((odometry.translation().head<2>() - by_log.translation()).norm() < 1e-9);
+      const cairn::SE3 begin = cairn::read_tum(folder / "out" / "trajectory.txt").front().T_world_body;
+      CHECK((begin.translation().head<2>() - by_log.translation()).norm() <
+            (map.starts_with("tiles") ? 1e-9 : 0.005));
+      // The lower left corner of the map: within the beams' reach of there.
+      const std::string yaml = cairn::read_file(folder / "out" / "map.yaml");
+      double left = 0, bottom = 0;
+      REQUIRE(std::sscanf(yaml.c_str() + yaml.find("origin: ["), "origin: [%lf, %lf", &left, &bottom) == 2);
+      CHECK(std::abs(left - by_log.x()) < 85);
+      CHECK(std::abs(bottom - by_log.y()) < 85);
+    }
   }
 
   TEST_CASE("grid_slam: a log in two runs, by way of a saved map, gives the bytes of one run") {
@@ -232,6 +266,38 @@ TEST_SUITE("grid_slam/program") {
     CHECK(run("--load " + named("torn") + with_log).says("bytes after the head, expected"));
     CHECK(run("--load " + named("map") + " --localise --window 500 500 510 510" + with_log)
               .says("outside of the map"));
+  }
+
+  TEST_CASE("grid_slam: where no place in the window explains the first scan, no folder is left") {
+    const cairn_test::Folder folder;
+    folder.put("log", short_log(40));
+    std::string round;  // no wall of a corridor
+    for (int scan = 0; scan < 2; ++scan) {
+      round += "FLASER 90";
+      for (int beam = 0; beam < 90; ++beam) round += " 3";
+      const std::string pose = " " + std::to_string(scan) + " 0 0";
+      round += pose + pose + " " + std::to_string(scan) + " h 0\n";
+    }
+    folder.put("round", round);
+    const auto named = [&](const char* name) { return "\"" + (folder / name).string() + "\""; };
+    REQUIRE(
+        run("--particles 2 --log " + named("log") + " --out " + named("mapped") + " --save " + named("map"))
+            .code == 0);
+    fs::create_directory(folder / "there");
+    const auto localise = [&](const char* out) {
+      return run("--load " + named("map") + " --localise --window -3 -3 3 3 --log " + named("round") +
+                 " --out " + named(out));
+    };
+    for (const char* out : {"new", "a/new/one/", "there"}) {
+      CAPTURE(out);
+      const Outcome outcome = localise(out);
+      CAPTURE(outcome.words);
+      CHECK(outcome.code == 2);
+      CHECK(outcome.says("no place in the window explains the first scan"));
+    }
+    CHECK_FALSE(fs::exists(folder / "new"));
+    CHECK_FALSE(fs::exists(folder / "a"));
+    CHECK(fs::is_empty(folder / "there"));
   }
 
   TEST_CASE("grid_slam: a map too large for a picture is left out with a note, and nothing else is") {

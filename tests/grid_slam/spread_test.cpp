@@ -2,17 +2,18 @@
 // SPDX-License-Identifier: MIT
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include <doctest/doctest.h>
 
 #include <cairn/core/cholesky.hpp>
 #include <cairn/core/random.hpp>
+#include <cairn/core/statistics.hpp>
 #include <cairn/scan/independence.hpp>
 
 #include "floor_plan.hpp"
 #include "occupancy_map.hpp"
-#include "support/random.hpp"
 
 namespace spread_test {
 namespace {
@@ -33,34 +34,35 @@ std::vector<Vector<2>> drawn_errors(Random& random, std::size_t count) {
   return errors;
 }
 
+/// Errors across the walls of a hundred scans, as the matches would leave them.
+std::vector<std::vector<double>> drawn_residuals(std::uint64_t seed) {
+  Random random(seed);
+  std::vector<std::vector<double>> residuals;
+  for (int i = 0; i < 100; ++i) {
+    auto& scan = residuals.emplace_back();
+    for (const Vector<2>& e : drawn_errors(random, 181)) scan.push_back(e(0));
+  }
+  return residuals;
+}
+
 }  // namespace
 
 TEST_SUITE("grid_slam/spread") {
   TEST_CASE(
       "spread: with the independence that the errors show, poses lie in the proposal's Gaussian as often "
       "as it says; with all beams taken for independent they do not") {
-    const std::uint64_t seed = cairn_test::seed(11);
-    CAPTURE(seed);
-    Random random(seed);
     const Drive drive = simulated_drive({.seed = 3, .range_sigma = 0});
-    std::vector<std::vector<double>> residuals;
-    for (int i = 0; i < 100; ++i) {
-      auto& scan = residuals.emplace_back();
-      for (const Vector<2>& e : drawn_errors(random, 181)) scan.push_back(e(0));
-    }
-    const double planted = (1 - share) / (1 + share);
-    const auto estimated = independence_of(residuals);
-    REQUIRE(estimated);
-    CHECK(*estimated == doctest::Approx(planted).epsilon(0.3).scale(0));
-
     OccupancyMap map{OccupancyGrid({.geometry = {}, .field_radius = 6}), {}};
     for (std::size_t i = 0; i < 240; i += 2) map.insert(drive.truth[i], scan_points(drive.log.scans[i].scan));
     const Matrix<3> noise = Vector<3>(0.05 * 0.05, 0.05 * 0.05, 0.03 * 0.03).asDiagonal();
-    const auto nees = [&](double independence) {
+    struct Sum {
+      double squares = 0;
+      int poses = 0;
+      [[nodiscard]] double mean() const { return squares / poses; }
+    };
+    const auto add_nees = [&](Sum& sum, double independence, std::uint64_t seed) {
       map.model = {.sigma = sigma, .outliers = 0.01, .independence = independence};
       Random draws(seed, 1);
-      double sum = 0;
-      std::size_t count = 0;
       for (std::size_t i = 21; i < 220; i += 1) {
         std::vector<ScanPoint> points = scan_points(drive.log.scans[i].scan);
         const auto errors = drawn_errors(draws, points.size());
@@ -73,19 +75,25 @@ TEST_SUITE("grid_slam/spread") {
         REQUIRE(found);
         const Cholesky<3> root(found->covariance);
         REQUIRE(root.good());
-        sum += root.whiten(local(found->mean, drive.truth[i])).squaredNorm();
-        ++count;
+        sum.squares += root.whiten(local(found->mean, drive.truth[i])).squaredNorm();
+        ++sum.poses;
       }
-      return sum / static_cast<double>(count);
     };
-    // 199 poses: the mean of as many chi-squares of three degrees of freedom has a deviation of 0.17; four of
-    // them, for any seed.
-    const double calibrated = nees(*estimated), all = nees(1);
-    CAPTURE(calibrated);
-    CAPTURE(all);
-    CHECK(calibrated > 3 - 4 * 0.174);
-    CHECK(calibrated < 3 + 4 * 0.174);
-    CHECK(all > 5);
+    // The seeds are fixed: the band of 99 % refuses one set of seeds in a hundred.
+    constexpr std::uint64_t seeds = 5;
+    const double planted = (1 - share) / (1 + share);
+    Sum calibrated, all;
+    for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
+      CAPTURE(seed);
+      const auto estimated = independence_of(drawn_residuals(seed));
+      REQUIRE(estimated);
+      CHECK(*estimated == doctest::Approx(planted).epsilon(0.3).scale(0));
+      add_nees(calibrated, *estimated, seed);
+      add_nees(all, 1, seed);
+    }
+    CAPTURE(calibrated.mean());
+    CHECK(chi_square_mean_band(3, calibrated.poses, 0.99).contains(calibrated.mean()));
+    CHECK(all.mean() > 5);
   }
 }
 

@@ -142,6 +142,13 @@ public:
   [[nodiscard]] std::size_t entries() const noexcept { return tree_->entries(); }
   /// Bytes of entries and of the lists of who wrote what, without what vectors keep in reserve.
   [[nodiscard]] std::size_t bytes() const noexcept { return tree_->bytes(); }
+  /// Tiles that SharedTiles would hold in the place of this tree, for all its grids: what copies share
+  /// counted once, and as if no grid shared anything.
+  struct AsTiles {
+    std::size_t shared = 0, separate = 0;
+  };
+  /// O(tiles (entries of one + nodes)).
+  [[nodiscard]] AsTiles as_tiles() const { return tree_->as_tiles(); }
   /// Whether every promise about the tree holds, by looking at all of it.
   [[nodiscard]] bool consistent() const { return tree_->consistent(); }
 
@@ -208,6 +215,26 @@ private:
       cells_.for_each_tile([&](TileAddress, const auto& tile) {
         sum += sizeof tile;
         for (const Entries& entries : tile) sum += entries.size() * sizeof(Entry);
+      });
+      return sum;
+    }
+
+    /// Of a tile a grid has the copy that its nearest ancestor made who wrote into it.
+    [[nodiscard]] AsTiles as_tiles() const {
+      AsTiles sum;
+      cells_.for_each_tile([&](TileAddress, const auto& tile) {
+        std::vector<bool> wrote(nodes_.size()), has_copy(nodes_.size());  // by name; by number
+        for (const Entries& entries : tile)
+          for (const Entry& entry : entries) wrote[entry.name] = true;
+        for (const Node& grid : nodes_) {
+          if (grid.holders == 0) continue;
+          auto node = static_cast<NodeNumber>(&grid - nodes_.data());
+          while (node != none && !wrote[nodes_[node].name]) node = nodes_[node].parent;
+          if (node == none) continue;
+          sum.separate += grid.holders;
+          sum.shared += has_copy[node] ? 0 : 1;
+          has_copy[node] = true;
+        }
       });
       return sum;
     }
