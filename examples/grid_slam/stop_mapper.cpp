@@ -297,7 +297,7 @@ private:
     };
     const cairn::MappingStep step = filter.step(belief_, motion, with_room, Map::observed(scan.scan));
     if (!step.accepted()) refuse_step(step.status, all_have_room, options_.map.geometry.cell_size);
-    spread_.take(belief_);
+    if (!scans_are_matched()) spread_.take(belief_);
     steps_.push_back({scans_.size() - 1, step.effective_size, step.resampled, false, belief_.pose()});
     moved_ = SE2();
     distance_ = angle_ = 0;

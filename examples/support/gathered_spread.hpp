@@ -104,12 +104,12 @@ private:
 /// Second moments about zero of a deviation d with density N(d; 0, prior) exp(log_likelihood(d)), by draws
 /// from a Gaussian that follows while the likelihood's power grows to 1, each time so far that enough of the
 /// draws are left as an effective number (tempering as of R. Neal, "Annealed importance sampling", Statistics
-/// and Computing 11, 2001). The prior where the draws do not get there. O(rounds times 200 likelihoods).
+/// and Computing 11, 2001). The prior where the draws do not get there. O(rounds times 100 likelihoods).
 template <class LogLikelihood>
 [[nodiscard]] cairn::Matrix<3> moments_about_zero(const cairn::Matrix<3>& prior,
                                                   const LogLikelihood& log_likelihood,
                                                   cairn::Random& random) {
-  constexpr std::size_t draws = 200;
+  constexpr std::size_t draws = 100;
   constexpr int most_rounds = 30;
   const cairn::Cholesky<3> prior_root(prior);
   if (!prior_root.good()) return prior;
