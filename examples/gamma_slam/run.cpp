@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <utility>
 
 #include <cairn/core/check.hpp>
 #include <cairn/filter/conditional.hpp>
+
+#include "support/gathered_spread.hpp"
 
 namespace gamma_slam {
 
@@ -26,6 +29,53 @@ Matrix<3> motion_noise(const TerrainScan& scan, bool first, const RunOptions& op
   const Matrix<3> common =
       Vector<3>(slip * slip, slip * slip, options.turn_sigma * options.turn_sigma).asDiagonal();
   return scan.moved_covariance + common + exact;
+}
+
+/// Scans and the map that some of them made, for example::spread_of_poses().
+template <class Cell>
+struct OldGround {
+  const std::vector<TerrainScan>* scans;
+  ElevationMap<Cell> map;
+  std::size_t inserted = 0;
+
+  void insert(std::size_t k, const SE2& pose) {
+    map.insert(pose, (*scans)[k]);
+    inserted = k + 1;
+  }
+  template <class Visit>
+  void for_each_cell(std::size_t k, const SE2& pose, const Visit& visit) const {
+    for (const GroundPoint& p : (*scans)[k].points) {
+      const Vector<2> at = pose * Vector<2>(p.x, p.y);
+      visit(map.options().geometry.cell_of(at(0), at(1)));
+    }
+  }
+  [[nodiscard]] auto evidence(std::size_t k) const {
+    TerrainScan scan = (*scans)[k];
+    scan.climbed = scan.climbed_variance = 0;  // since the map's last scan
+    for (std::size_t i = inserted; i <= k; ++i) {
+      scan.climbed += (*scans)[i].climbed;
+      scan.climbed_variance += (*scans)[i].climbed_variance;
+    }
+    return [this, scan = std::move(scan)](const SE2& pose) { return map.log_likelihood(pose, scan); };
+  }
+};
+
+/// The newest pose, and how far it may be off.
+template <class Cell>
+Gaussian<SE2> newest_pose(const cairn::MappedPaths<ElevationMap<Cell>>& belief,
+                          const example::GatheredSpread& spread, const Drive& drive,
+                          const RunOptions& options) {
+  constexpr double farther = 20;  // [m]: twice what a camera reaches, before and after a pose
+  Gaussian<SE2> pose = spread.pose(belief);
+  std::vector<SE2> path;
+  for (const auto& each : belief.path(belief.best())) path.push_back(each.pose);
+  path.erase(path.begin());  // the start, which the first scan repeats
+  path.back() = pose.mean;
+  const OldGround<Cell> nothing{&drive.scans, ElevationMap<Cell>(options.map)};
+  pose.covariance = example::spread_of_poses(nothing, path, spread.along(path.size(), pose),
+                                             {path.size() - 1}, farther, options.seed)
+                        .front();
+  return pose;
 }
 
 /// A rectangle of cells, both corners inside.
@@ -115,6 +165,7 @@ void map_drive(Results& r, const Drive& drive, const std::function<std::optional
   const RunOptions& options = r.options;
   cairn::MappedPaths<Map> belief(drive.truth.front(), Map(options.map), options.particles);
   Map by_odometry(options.map);
+  example::GatheredSpread spread;
   const cairn::ConditionalFilter filter{
       .resample_below = options.resample_below, .seed = options.seed, .threads = options.threads};
   for (const TerrainScan& scan : drive.scans) {
@@ -125,6 +176,7 @@ void map_drive(Results& r, const Drive& drive, const std::function<std::optional
     const cairn::MappingStep step = filter.step(belief, motion, proposal, scan);
     if (!step.accepted())
       cairn::raise("scan " + std::to_string(r.scans) + ": " + cairn::explain(step.status));
+    spread.take(belief);
     r.resampled += step.resampled;
     r.effective_size.push_back(step.effective_size);
     r.time.push_back(scan.time);
@@ -143,7 +195,7 @@ void map_drive(Results& r, const Drive& drive, const std::function<std::optional
   // The path begins with the start, which the first scan repeats.
   for (const auto& each : belief.path(belief.best())) r.path.push_back(each.pose);
   r.path.erase(r.path.begin());
-  r.newest = belief.pose();
+  r.newest = newest_pose(belief, spread, drive, options);
   const Map& best = belief[belief.best()].map;
   const CellBox box = box_of(drive.terrain, best, by_odometry);
   r.odometry_map = image_of(by_odometry, box);

@@ -62,7 +62,8 @@ struct Results {
   std::vector<double> time, effective_size;
   std::vector<cairn::SE2> truth, odometry, path;  ///< one pose a scan; path is the best particle's
   std::vector<std::vector<cairn::SE2>> paths;     ///< of all particles, equal ones once
-  /// Of the particles alone: too sure, since what their common ancestors erred is not in it.
+  /// Mean of the newest poses as drawn, seen from the start, and how far it may be off: what lines that died
+  /// out knew of the way, and, where ground is met again, how well the newest scan fits what was seen first.
   cairn::Gaussian<cairn::SE2> newest;
   std::string drive;  ///< its name
   SigmaImage odometry_map, filter_map;

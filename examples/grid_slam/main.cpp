@@ -175,10 +175,8 @@ int main(int argc, char** argv) {
       ->transform(example::one_of<Frame>({{"odometry", Frame::odometry}, {"start", Frame::start}}))
       ->type_name("NAME")
       ->default_str("start");
-  app.add_option(
-         "--proposal", options.proposal,
-         "of --map stop and ancestry: poses drawn from odometry (motion; the covariance of the newest "
-         "pose is then too small), or where the scan matches")
+  app.add_option("--proposal", options.proposal,
+                 "of --map stop and ancestry: poses drawn from odometry (motion), or where the scan matches")
       ->transform(
           example::one_of<StopProposal>({{"motion", StopProposal::motion}, {"match", StopProposal::match}}))
       ->type_name("NAME")

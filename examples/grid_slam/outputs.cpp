@@ -218,7 +218,8 @@ void add_spread(example::Report& page, const Results& r) {
   }
   const std::string path =
       "Standard deviation of the newest pose, seen from where the map begins: of the particles' spread "
-      "and of what the best one's path has gathered step by step, less what loops have told of it.";
+      "and of what the best one's path has gathered step by step, less what places met again have told of "
+      "it.";
   const std::string particles =
       "Standard deviation of the newest pose over all particles. It does not hold what they all have "
       "in common, as the steps of a common ancestor.";

@@ -9,6 +9,7 @@
 #include <ctime>
 #include <exception>
 #include <set>
+#include <utility>
 
 #include <cairn/core/check.hpp>
 #include <cairn/filter/conditional.hpp>
@@ -21,6 +22,7 @@
 #include "odometry_frame.hpp"
 #include "room.hpp"
 #include "run.hpp"
+#include "support/gathered_spread.hpp"
 
 namespace grid_slam {
 
@@ -117,6 +119,29 @@ struct MatchedStopMap {
   [[nodiscard]] const auto& stops() const { return stop_map.grid; }
 };
 
+/// Scans and the stops that some of them made, for example::spread_of_poses().
+struct OldStops {
+  std::vector<const cairn::LaserScan*> scans;
+  cairn::StopGrid<cairn::SharedTiles<StopCell>> grid;
+
+  void insert(std::size_t k, const SE2& pose) {
+    if (has_room(grid.options().geometry, grid.cells(), pose, scans[k]->farthest))
+      grid.insert(*scans[k], pose);
+  }
+  template <class Visit>
+  void for_each_cell(std::size_t k, const SE2& pose, const Visit& visit) const {
+    for (const cairn::ScanPoint& p : cairn::scan_points(*scans[k])) {
+      const Vector<2> at = pose * Vector<2>(p.x, p.y);
+      visit(grid.options().geometry.cell_of(at(0), at(1)));
+    }
+  }
+  [[nodiscard]] auto evidence(std::size_t k) const {
+    return [prepared = grid.prepared(), scan = scans[k]](const SE2& pose) mutable {
+      return prepared.log_likelihood(*scan, pose);
+    };
+  }
+};
+
 /// Bytes of all particles' stops, what they share counted once.
 template <class Map>
 std::size_t bytes_of(const cairn::MappedPaths<Map>& belief) {
@@ -196,8 +221,8 @@ public:
     for (const auto& pose : path)
       if (pose.step > 0) r.drawn_from.push_back(pose.drawn_from);
     r.drawn_by_scans = scans_are_matched();
-    r.newest = newest();
-    r.newest_has_path = scans_are_matched();
+    r.newest = pose();
+    if (!scans_are_matched()) put_spread_into(r);
     r.map = map_picture();
     r.bytes = bytes_of(belief_);
     for (std::size_t i = 0; i < belief_.size(); ++i) {
@@ -211,7 +236,7 @@ public:
     Snapshot s{.scans = scans_.size(),
                .processed = steps_.size(),
                .effective_size = steps_.back().effective_size,
-               .newest = newest().covariance,
+               .newest = pose().covariance,
                .map = PackedMap(map_picture()),
                .bytes = bytes_of(belief_)};
     put_memory(s, belief_);
@@ -222,11 +247,33 @@ public:
 private:
   [[nodiscard]] bool scans_are_matched() const { return options_.proposal == StopProposal::match; }
 
-  /// Where scans are matched, the path's steps are as sure as the grid mapper's.
-  [[nodiscard]] Gaussian<SE2> newest() const {
+  /// With the covariance that the path has gathered: where scans are matched, from steps that are as sure as
+  /// the grid mapper's.
+  [[nodiscard]] Gaussian<SE2> pose() const {
+    if (!scans_are_matched()) return spread_.pose(belief_);
     Gaussian<SE2> pose = belief_.pose();
-    if (scans_are_matched()) pose.covariance += covariance_of_end(belief_.path(belief_.best()), {});
+    pose.covariance += covariance_of_end(belief_.path(belief_.best()), {});
     return pose;
+  }
+
+  /// Of the newest pose, and of the frames', from the best path.
+  void put_spread_into(Results& r) const {
+    constexpr double farther = 2;  // [m]: errors of scans nearer by are the newest one's own
+    std::vector<SE2> path;
+    for (const auto& each : belief_.path(belief_.best())) path.push_back(each.pose);
+    path.erase(path.begin());  // the start, where the first scan is
+    path.back() = r.newest.mean;
+    cairn::StopOptions all_beams = options_.map;  // so few poses are asked about here
+    all_beams.every = 1;
+    OldStops nothing{{}, cairn::StopGrid<cairn::SharedTiles<StopCell>>(all_beams)};
+    for (const StepRecord& step : steps_) nothing.scans.push_back(&scans_[step.scan].scan);
+    std::vector<std::size_t> asked;
+    for (const Snapshot& s : r.snapshots) asked.push_back(s.processed - 1);
+    asked.push_back(steps_.size() - 1);
+    const auto spread = example::spread_of_poses(
+        std::move(nothing), path, spread_.along(path.size(), r.newest), asked, farther, options_.seed);
+    for (std::size_t i = 0; i < r.snapshots.size(); ++i) r.snapshots[i].newest = spread[i];
+    r.newest.covariance = spread.back();
   }
 
   [[nodiscard]] MapImage map_picture() const {
@@ -263,6 +310,7 @@ private:
     };
     const cairn::MappingStep step = filter.step(belief_, motion, with_room, Map::observed(scan.scan));
     if (!step.accepted()) refuse_step(step.status, all_have_room, options_.map.geometry.cell_size);
+    if (!scans_are_matched()) spread_.take(belief_);
     steps_.push_back({scans_.size() - 1, step.effective_size, step.resampled, false, belief_.pose()});
     moved_ = SE2();
     distance_ = angle_ = 0;
@@ -271,6 +319,7 @@ private:
   StopMapperOptions options_;
   SE2 T_odom_first_;  // of the laser, at the first scan
   Belief belief_;
+  example::GatheredSpread spread_;
   std::vector<cairn::StampedScan> scans_;
   std::vector<StepRecord> steps_;
   SE2 moved_;

@@ -56,8 +56,9 @@ struct StopMapperOptions {
 [[nodiscard]] StopMapperOptions matching_stops();
 
 /// Maps the log; the rest as run(). The covariance of the newest pose is as Mapper::newest() where scans are
-/// matched; drawn from motion it is the particles' spread, too sure wherever they have one ancestor. Throws
-/// cairn::Error on options out of range.
+/// matched. Drawn from motion it is that of lines that died out as well, and, where a scan sees what was seen
+/// 2 m before or earlier, of how well it fits there, by all that the beams' evidence leaves open: too modest
+/// where that counts for less than it is worth. Throws cairn::Error on options out of range.
 [[nodiscard]] Results run_stop_mapper(const cairn::CarmenLog& log, const StopMapperOptions& options,
                                       const std::vector<cairn::PoseRelation>& relations,
                                       const std::function<std::optional<std::string>()>& on_scan = {},

@@ -9,6 +9,7 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
+#include <cairn/core/statistics.hpp>
 #include <cairn/eval/consistency.hpp>
 
 #include "drive.hpp"
@@ -142,6 +143,32 @@ TEST_SUITE("gamma_slam/run") {
     CHECK(r.coverage->share() > 0.80);
     CHECK(r.coverage->share() < 0.97);
     CHECK(r.path.size() == drive.scans.size());
+  }
+
+  TEST_CASE(
+      "gamma_slam: the truth is in the newest pose's spread, on the way and where ground is met again") {
+    constexpr int drives = 2;
+    double on_the_way = 0, met_again = 0, narrowed = 0;  // means of NEES; what is left of the variance
+    for (std::uint64_t seed = 3; seed < 3 + drives; ++seed) {
+      Drive drive = simulated_drive({.seed = seed, .laps = 1});
+      const auto newest_after = [&](std::size_t scans) {
+        drive.scans.resize(scans);
+        return run(drive, {.particles = 30, .seed = seed, .threads = 2}).newest;
+      };
+      const auto after = newest_after(201), before = newest_after(125);
+      met_again += cairn::nees(after, drive.truth[200]) / drives;
+      on_the_way += cairn::nees(before, drive.truth[124]) / drives;
+      narrowed += after.covariance(1, 1) / before.covariance(1, 1) / drives;
+    }
+    CAPTURE(on_the_way);
+    CAPTURE(met_again);
+    // The particles alone had hundreds where ground is met again: they had one ancestor.
+    const double most = cairn::chi_square_quantile(0.995, 3 * drives) / drives;
+    CHECK(on_the_way < most);
+    CHECK(on_the_way > 0.2);
+    CHECK(met_again < most);
+    CHECK(met_again > 0.2);
+    CHECK(narrowed < 0.25);  // what is met again takes back what the lap has gathered
   }
 
   TEST_CASE("gamma_slam: the report counts time from the start, whenever that was") {

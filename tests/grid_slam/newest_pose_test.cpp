@@ -97,24 +97,45 @@ TEST_SUITE("grid_slam/newest_pose") {
     CHECK(report(r) != page);
   }
 
-  TEST_CASE("newest_pose: of DP-SLAM's map with scans matched, the truth is in its spread") {
-    double told = 0, by_particles = 0;
-    for (std::uint64_t seed = 1; seed <= drives; ++seed) {
-      const Drive drive = simulated_drive({.seed = seed});
-      CarmenLog log = drive.log;
-      log.scans.resize(280);
-      StopMapperOptions options = matching_stops();
+  TEST_CASE(
+      "newest_pose: of DP-SLAM's map, the truth is in its spread, with scans matched or drawn from motion") {
+    for (const StopProposal proposal : {StopProposal::match, StopProposal::motion}) {
+      CAPTURE(proposal == StopProposal::match);
+      StopMapperOptions options = proposal == StopProposal::match ? matching_stops() : StopMapperOptions{};
       options.start = SE2();
       options.storage = StopStorage::tiles;
-      options.particles = 8;
-      options.seed = seed;
+      options.particles = proposal == StopProposal::match ? 8 : 16;
       options.threads = 2;
-      const Results r = run_stop_mapper(log, options, {});
-      const SE2 truth = drive.truth.front().inverse() * drive.truth[r.steps.back().scan];
-      told += squared_distance(r.newest, truth) / drives;
-      by_particles += squared_distance(r.steps.back().pose, truth) / drives;
+      double told = 0, by_particles = 0;
+      for (std::uint64_t seed = 1; seed <= drives; ++seed) {
+        const Drive drive = simulated_drive({.seed = seed});
+        CarmenLog log = drive.log;
+        log.scans.resize(280);
+        options.seed = seed;
+        const Results r = run_stop_mapper(log, options, {});
+        const SE2 truth = drive.truth.front().inverse() * drive.truth[r.steps.back().scan];
+        told += squared_distance(r.newest, truth) / drives;
+        by_particles += squared_distance(r.steps.back().pose, truth) / drives;
+      }
+      expect_spread(told, by_particles);
     }
-    expect_spread(told, by_particles);
+  }
+
+  TEST_CASE(
+      "newest_pose: of DP-SLAM's map, drawn from motion, each frame has its own, the same on tree and "
+      "tiles") {
+    CarmenLog log = simulated_drive({.seed = 2}).log;
+    log.scans.resize(60);
+    StopMapperOptions options{.storage = StopStorage::tiles, .particles = 10};
+    const Results tiles = run_stop_mapper(log, options, {}, {}, 3);
+    options.storage = StopStorage::ancestry;
+    const Results tree = run_stop_mapper(log, options, {}, {}, 3);
+    REQUIRE(tiles.snapshots.size() == 3);
+    CHECK(tiles.newest.covariance == tree.newest.covariance);
+    for (const Results* r : {&tiles, &tree}) {
+      CHECK(r->snapshots.back().newest == r->newest.covariance);
+      CHECK(r->snapshots[0].newest.trace() < r->snapshots[1].newest.trace());
+    }
   }
 
   TEST_CASE("newest_pose: a closed loop takes back what the lap has gathered") {
