@@ -388,15 +388,15 @@ public:
   [[nodiscard]] double effective_ancestors(std::uint64_t step) const {
     CAIRN_EXPECTS(step <= step_, "effective_ancestors needs a step that was");
     const std::vector<double> weights = particles_.weights();
-    struct Line {
+    struct Descent {
       std::uint32_t node;
       std::size_t first;  // of the particles below it, in whose order sums do not depend on nodes' numbers
       double weight;
     };
-    std::vector<Line> lines;
+    std::vector<Descent> lines;
     for (std::size_t i = 0; i < size(); ++i) lines.push_back({(*this)[i].node, i, weights[i]});
     for (std::uint64_t back = step_;; --back) {
-      std::ranges::sort(lines, {}, [](const Line& line) { return std::pair(line.node, line.first); });
+      std::ranges::sort(lines, {}, [](const Descent& line) { return std::pair(line.node, line.first); });
       std::size_t kept = 0;
       for (std::size_t i = 1; i < lines.size(); ++i) {
         if (lines[i].node == lines[kept].node)
@@ -406,11 +406,11 @@ public:
       }
       lines.resize(kept + 1);
       if (back == step) break;
-      for (Line& line : lines) line.node = paths_.parent(line.node);
+      for (Descent& line : lines) line.node = paths_.parent(line.node);
     }
-    std::ranges::sort(lines, {}, &Line::first);
+    std::ranges::sort(lines, {}, &Descent::first);
     double squares = 0;
-    for (const Line& line : lines) squares += line.weight * line.weight;
+    for (const Descent& line : lines) squares += line.weight * line.weight;
     return 1 / squares;
   }
 
