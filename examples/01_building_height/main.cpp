@@ -54,7 +54,7 @@ int main(int argc, char** argv) {
        .steps = 1000,
        .least_steps = 100,
        .mistakes = {{"sigma-for-variance",
-                     "deviation (5 m) in place of variance (25 m^2); asked in Stone-Soup #347"},
+                     "deviation (5 m) in place of variance (25 m^2); paparazzi's hf_float.c (#3661)"},
                     {"variance-stays",
                      "the variance never falls, nor does the gain; jjviscomi/kalman-filter until PR #2"}}},
       argc, argv);

@@ -83,7 +83,7 @@ int main(int argc, char** argv) {
        200,
        20,
        5000,
-       {{"plain-radius", "r in the place of r^2 (asked of nanoflann: #94, #128, #145)"},
+       {{"plain-radius", "r in the place of r^2: OpenCV called a squared radius \"radius\" (#12683)"},
         {"child-point", "distance to a point beyond the split, not to the split (elixir-nx/scholar #343)"}}},
       argc, argv);
   cairn::Random random(lesson.seed());

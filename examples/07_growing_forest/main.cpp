@@ -74,7 +74,7 @@ int main(int argc, char** argv) {
        500,
        64,
        1500,
-       {{"rebuild", "one tree, built anew at each step: all that a static index leaves one (nanoflann #111)"},
+       {{"rebuild", "one tree, built anew at each step, as A-LOAM's laserMapping.cpp does"},
         {"erased-come-back", "a merge brings erased points back (nanoflann until #99, 2018)"}}},
       argc, argv);
   cairn::Random random(lesson.seed());
