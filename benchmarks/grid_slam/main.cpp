@@ -24,6 +24,9 @@
 
 #include <cairn/eval/relations.hpp>
 #include <cairn/io/carmen.hpp>
+#include <cairn/io/netpbm.hpp>
+#include <cairn/scan/occupancy_grid.hpp>
+#include <cairn/scan/scan.hpp>
 
 #include "filled_path.hpp"
 #include "floor_plan.hpp"
@@ -71,7 +74,25 @@ double worst(const std::vector<double>& values) {
   return *std::ranges::max_element(values);
 }
 
-Runs runs_of(const cairn::CarmenLog& log, const std::vector<cairn::PoseRelation>& relations) {
+/// A map as build/scoreboard/NAME.pgm, beside the numbers.
+void put(const std::string& name, const grid_slam::MapImage& map) {
+  const std::filesystem::path folder = "build/scoreboard";
+  std::filesystem::create_directories(folder);
+  cairn::write_pgm(folder / (name + ".pgm"), map.image);
+}
+
+/// The scans that a rival processed, drawn by our grid along its path, which begins where our map does.
+void draw(const std::string& name, const cairn::CarmenLog& log, const grid_slam_bench::RivalPath& path) {
+  const grid_slam::MapperOptions options;
+  cairn::OccupancyGrid grid({{options.cell_size, 0, 0}, options.field_radius});
+  const cairn::SE2 start = path.poses.front().inverse();
+  for (std::size_t k = 0; k < path.poses.size(); ++k)
+    grid.insert(start * path.poses[k], cairn::scan_points(log.scans[path.processed[k]].scan));
+  put(name, grid_slam::map_image(grid));
+}
+
+Runs runs_of(const std::string& name, const cairn::CarmenLog& log,
+             const std::vector<cairn::PoseRelation>& relations) {
   Runs runs;
   for (std::uint64_t seed = 1; seed <= seeds; ++seed) {
     std::vector<std::clock_t> ends{std::clock()};
@@ -82,6 +103,7 @@ Runs runs_of(const cairn::CarmenLog& log, const std::vector<cairn::PoseRelation>
     const Results r =
         grid_slam::run(log, {.seed = seed, .threads = std::max(1U, std::thread::hardware_concurrency())},
                        relations, on_scan);
+    if (seed == 1) put(name + "_grid_slam", r.map);
     std::vector<double> scans;  // CPU of the processed ones [ms]
     for (const grid_slam::StepRecord& step : r.steps)
       scans.push_back(1e3 * static_cast<double>(ends[step.scan + 1] - ends[step.scan]) / CLOCKS_PER_SEC);
@@ -121,13 +143,19 @@ struct RivalRuns {
   }
 };
 
-std::vector<RivalRuns> rivals_of(const cairn::CarmenLog& log,
+std::vector<RivalRuns> rivals_of(const std::string& name, const cairn::CarmenLog& log,
                                  const std::vector<cairn::PoseRelation>& relations) {
   constexpr std::uint64_t rival_seeds = 3;  // GMapping takes one to two minutes for each
   RivalRuns filter{.name = "GMapping"}, graph{.name = "open_karto"};
   for (std::uint64_t seed = 1; seed <= rival_seeds; ++seed)
-    if (const auto path = grid_slam_bench::gmapping(log, seed)) filter.add(log, *path, relations);
-  if (const auto path = grid_slam_bench::open_karto(log)) graph.add(log, *path, relations);
+    if (const auto path = grid_slam_bench::gmapping(log, seed)) {
+      filter.add(log, *path, relations);
+      if (seed == 1) draw(name + "_gmapping", log, *path);
+    }
+  if (const auto path = grid_slam_bench::open_karto(log)) {
+    graph.add(log, *path, relations);
+    draw(name + "_open_karto", log, *path);
+  }
   std::vector<RivalRuns> all{filter, graph};
   std::erase_if(all, [](const RivalRuns& r) { return r.mean.empty(); });
   return all;
@@ -152,8 +180,8 @@ void add_rows(Scoreboard& board, const Figures& f, const std::optional<std::file
   if (folder)
     if (const auto log = unpacked(*folder / (f.log + ".clf.bz2"))) {
       const auto relations = cairn::read_relations(*folder / (f.log + ".relations"));
-      runs = runs_of(*log, relations);
-      rivals = rivals_of(*log, relations);
+      runs = runs_of(f.log, *log, relations);
+      rivals = rivals_of(f.log, *log, relations);
     }
   const auto row = [&](const std::string& name, const char* unit, std::optional<double> must,
                        std::optional<double> aim, const auto& value) {

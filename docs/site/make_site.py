@@ -215,10 +215,11 @@ def draw(path, title, x_label, y_label, curves, logarithmic=False):
 
 
 def figures(site):
-    """README's picture for the first page; those of docs/multi_kd_tree.md, from the counters of lesson 07 at its longest."""
+    """README's picture for the first page and docs/grid.md's; those of docs/multi_kd_tree.md, from the counters of lesson 07 at its longest."""
     folder = site / "figures"
     folder.mkdir(exist_ok=True)
-    shutil.copy(HERE / "visual_slam.png", folder)
+    for name in ("visual_slam.png", "aces_maps.png"):
+        shutil.copy(HERE / name, folder)
     with tempfile.TemporaryDirectory() as results:
         subprocess.run([str(ROOT / "build/release/examples/07_growing_forest"), "--steps", "1500", "--quiet", "--out", results],
                        check=True, stdout=subprocess.DEVNULL)

@@ -7,6 +7,7 @@
   links        to other pages and their headings become references, those to any other file of the project links to sources/
   <!-- site: NAME | words -->   becomes the figure figures/NAME.svg or figures/NAME.png with these words below, or,
                for the NAME `course`, the place of the lessons (make_site.py)
+  ![words](site/NAME)           a picture kept beside this file, likewise
 """
 import html
 import os
@@ -18,6 +19,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 FENCE = re.compile(r"^\s*```")
 HEADING = re.compile(r"^(#{1,4}) (.*?)\s*$")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
+IMAGE = re.compile(r"!\[(.*?)\]\(site/([^)\s]+)\)")
 FIGURE = re.compile(r"<!-- site: (\S+)(?: \| (.*?))? -->")
 
 
@@ -57,6 +59,10 @@ def figure(match):
     name, words = match.group(1), match.group(2) or ""
     if name == "course":
         return '\\htmlonly<div id="site-course"></div>\\endhtmlonly'
+    return picture(name, words)
+
+
+def picture(name, words):
     words = html.escape(words)
     return (f'\\htmlonly<figure><img src="figures/{name}" alt="{words}"/><figcaption>{words}</figcaption></figure>'
             "\\endhtmlonly")
@@ -79,6 +85,7 @@ def filtered(path):
             line = line.replace("```cpp", "```{.cpp}").replace("```cmake", "```{.cmake}").replace("```sh", "```{.sh}")
         elif not code:
             heading = HEADING.match(line)
+            line = IMAGE.sub(lambda found: picture(found.group(2), found.group(1)), line)
             # A link's words may hold backticks, so links are seen before them.
             line = LINK.sub(lambda found: f"]({link_target(found.group(1), page, folder)})", line)
             line = FIGURE.sub(figure, line)
