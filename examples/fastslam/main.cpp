@@ -181,6 +181,7 @@ int main(int argc, char** argv) {
     if (!options.load.empty() && !mapper.has_next())
       cairn::raise(options.load.string() + ": the map is of all " + std::to_string(log.frames.size()) +
                    " frames of the log: expected more to go on with (--frames)");
+    const example::NoEmptyFolder tidy(options.out);
     prepare_folder(options.out, {options.save});
     const Results results = run_with_progress(mapper);
     if (results.ended_early) std::cerr << name << ": " << *results.ended_early << '\n';
