@@ -170,7 +170,8 @@ int main(int argc, char** argv) {
   if (const std::optional<int> code = example::parse(app, name, argc, argv)) return *code;
   return example::exit_code_of(name, [&]() -> int {
     expect_use_of_all(app, options);
-    if (options.data != "loop") example::expect_not_read(options.save, files_in(folder_of(options)));
+    if (!options.save.empty() && options.data != "loop")
+      example::expect_not_read(options.save, files_in(folder_of(options)));
     options.slam.proposal = options.proposal == "motion" ? ProposalKind::motion : ProposalKind::landmarks;
     options.slam.landmarks.pick =
         options.association == "drawn" ? cairn::Pick::drawn : cairn::Pick::likeliest;

@@ -52,6 +52,7 @@ struct Study {
   Stream stream;
   std::vector<double> grid;  ///< n, growing geometrically
   std::vector<Result> results;
+  std::size_t best = 1;            ///< of the results: the forest whose steps took least together
   std::vector<double> gains = {};  ///< the single tree's time over the best forest's, of several runs of both
 };
 

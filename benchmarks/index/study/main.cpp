@@ -125,6 +125,7 @@ Study study(Stream stream) {
     gains.push_back(single / total_time(drive_of(list[best])));
   }
   Study all = analyse(std::move(stream), std::move(drives));
+  all.best = best;
   all.gains = std::move(gains);
   return all;
 }

@@ -138,16 +138,8 @@ void add_table(example::Report& report, const Study& study) {
   report.add(table);
 }
 
-const Result& best_forest(const Study& study) {
-  const Result* best = nullptr;
-  for (const Result& result : study.results)
-    if (is_forest(result) && (best == nullptr || result.curves.total.back() < best->curves.total.back()))
-      best = &result;
-  return *best;
-}
-
 void add_figures(example::Report& report, const Study& study) {
-  const Result& best = best_forest(study);
+  const Result& best = study.results[study.best];
   const double gain = cairn::median(study.gains);
   const auto [least, most] = std::ranges::minmax(study.gains);
   report.figure({.label = study.stream.name + ": single tree / best forest",
