@@ -13,12 +13,12 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
-#include <cairn/io/binary_file.hpp>
 #include <cairn/io/file.hpp>
 
 #include "mapper.hpp"
 #include "slam.hpp"
 #include "support/folder.hpp"
+#include "support/made_up_file.hpp"
 #include "support/random.hpp"
 
 namespace landmark_map_file_test {
@@ -58,9 +58,7 @@ bool same(const std::vector<cairn::StampedPose2>& a, const std::vector<cairn::St
 }
 
 std::string map_of(const std::string& numbers) {
-  cairn::BinaryWriter out;
-  for (const char c : numbers) out.put(c);
-  return out.file("cairnlmk", 1);
+  return cairn_test::file_holding(numbers, "cairnlmk", 1);
 }
 
 }  // namespace
@@ -164,7 +162,7 @@ TEST_SUITE("fastslam/map_file") {
     changed[bytes.size() / 2] = static_cast<char>(changed[bytes.size() / 2] ^ 1);
     folder.put("changed", changed);
     CHECK(words("changed", log).find("damaged") != std::string::npos);
-    folder.put("longer", map_of(bytes.substr(32) + "x"));
+    folder.put("longer", map_of(cairn_test::held_by(bytes) + "x"));
     CHECK_FALSE(words("longer", log).empty());
     folder.put("none", "frames");
     CHECK(words("none", log).find("no file of the kind") != std::string::npos);
@@ -182,7 +180,7 @@ TEST_SUITE("fastslam/map_file") {
     Mapper mapper(part, {.particles = 2});
     while (mapper.has_next()) mapper.step();
     mapper.save(folder / "map");
-    const std::string numbers = cairn::read_file(folder / "map").substr(32);
+    const std::string numbers = cairn_test::held_by(cairn::read_file(folder / "map"));
     const std::uint64_t seed = cairn_test::seed();
     CAPTURE(seed);
     cairn::Random random(seed);

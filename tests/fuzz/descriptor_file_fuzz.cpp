@@ -22,6 +22,7 @@
 #include <cairn/index/descriptor_file.hpp>
 
 #include "fuzz/scratch.hpp"
+#include "support/made_up_file.hpp"
 
 namespace {
 
@@ -32,15 +33,6 @@ void require(bool condition, const char* sentence) {
   if (condition) return;
   std::fprintf(stderr, "descriptor_file_fuzz: %s\n", sentence);
   std::abort();
-}
-
-/// FNV-1a of all but the first eight bytes and itself, as the format says, written into the file.
-void sign(std::string& bytes) {
-  if (bytes.size() < 56) return;
-  std::uint64_t sum = 14695981039346656037ULL;
-  for (std::size_t at = 8; at < bytes.size(); ++at)
-    if (at < 48 || at >= 56) sum = (sum ^ static_cast<unsigned char>(bytes[at])) * 1099511628211ULL;
-  for (std::size_t i = 0; i < 8; ++i) bytes[48 + i] = static_cast<char>(sum >> (8 * i) & 255U);
 }
 
 std::string saved(const Index& index) {
@@ -76,7 +68,7 @@ void check(const Index& index, const Points& points) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   std::string bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
-  if ((data[0] & 128U) != 0) sign(bytes);
+  if ((data[0] & 128U) != 0) cairn_test::sign(bytes, 48);
   std::vector<float> numbers(48);
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     const auto whole = static_cast<float>(i * 37 % 101);

@@ -8,16 +8,15 @@
 #include <cstdint>
 
 #include <cairn/core/check.hpp>
-#include <cairn/io/binary_file.hpp>
 
 #include "fuzz/scratch.hpp"
 #include "saved_map.hpp"
+#include "support/made_up_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const cairn_fuzz::Scratch scratch;
-  cairn::BinaryWriter numbers;
-  for (std::size_t i = 0; i < size; ++i) numbers.put(data[i]);
-  const auto path = scratch.put("map", numbers.file("cairnmap", stereo_slam::saved_map_version));
+  const auto path = scratch.put("map", cairn_test::file_holding(cairn_fuzz::text_of(data, size), "cairnmap",
+                                                                stereo_slam::saved_map_version));
   try {
     const stereo_slam::SavedMap saved = stereo_slam::load_map(path);
     cairn_fuzz::expect(saved.landmarks.size() == saved.map.landmark_count(), "every landmark is described");

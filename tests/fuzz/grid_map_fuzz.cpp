@@ -9,17 +9,16 @@
 #include <string>
 
 #include <cairn/core/check.hpp>
-#include <cairn/io/binary_file.hpp>
 #include <cairn/io/file.hpp>
 
 #include "fuzz/scratch.hpp"
 #include "mapper.hpp"
+#include "support/made_up_file.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const cairn_fuzz::Scratch scratch;
-  cairn::BinaryWriter numbers;
-  for (std::size_t i = 0; i < size; ++i) numbers.put(data[i]);
-  const auto path = scratch.put("map", numbers.file("cairngrd", 6));
+  const auto path =
+      scratch.put("map", cairn_test::file_holding(cairn_fuzz::text_of(data, size), "cairngrd", 6));
   try {
     grid_slam::Mapper mapper = grid_slam::Mapper::loaded(path);
     mapper.save(scratch / "again");

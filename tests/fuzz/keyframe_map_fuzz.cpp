@@ -11,6 +11,7 @@
 #include <cairn/slam/keyframe_map_file.hpp>
 
 #include "fuzz/scratch.hpp"
+#include "support/made_up_file.hpp"
 
 namespace {
 
@@ -24,10 +25,8 @@ cairn::KeyframeMap loaded(const std::string& bytes) {
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  cairn::BinaryWriter numbers;
-  for (std::size_t i = 0; i < size; ++i) numbers.put(data[i]);
   try {
-    cairn::KeyframeMap map = loaded(numbers.file("fuzzing ", 1));
+    cairn::KeyframeMap map = loaded(cairn_test::file_holding(cairn_fuzz::text_of(data, size), "fuzzing ", 1));
     cairn::BinaryWriter again;
     cairn::save_keyframe_map(again, map);
     cairn_fuzz::expect(loaded(again.file("fuzzing ", 1)).landmark_count() == map.landmark_count(),

@@ -9,12 +9,12 @@
 #include <string>
 
 #include <cairn/core/check.hpp>
-#include <cairn/io/binary_file.hpp>
 #include <cairn/io/file.hpp>
 #include <cairn/models/sensor.hpp>
 
 #include "fuzz/scratch.hpp"
 #include "mapper.hpp"
+#include "support/made_up_file.hpp"
 
 namespace {
 
@@ -35,9 +35,8 @@ fastslam::LandmarkLog drive() {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const cairn_fuzz::Scratch scratch;
   static const fastslam::LandmarkLog log = drive();
-  cairn::BinaryWriter numbers;
-  for (std::size_t i = 0; i < size; ++i) numbers.put(data[i]);
-  const auto path = scratch.put("map", numbers.file("cairnlmk", 1));
+  const auto path =
+      scratch.put("map", cairn_test::file_holding(cairn_fuzz::text_of(data, size), "cairnlmk", 1));
   try {
     fastslam::Mapper mapper = fastslam::Mapper::loaded(path, log, 1);
     mapper.save(scratch / "again");

@@ -20,29 +20,20 @@
 #include <cairn/index/multi_tree_file.hpp>
 
 #include "fuzz/scratch.hpp"
+#include "support/made_up_file.hpp"
 
 namespace {
 
 using Index = cairn::MultiKdTree<float, 2>;
 
-/// FNV-1a of the bytes from `begin` to `end` but for the eight at `sum_at`, written there.
-void sign(std::string& bytes, std::size_t begin, std::size_t sum_at, std::size_t end) {
-  if (end > bytes.size() || sum_at + 8 > end) return;
-  std::uint64_t sum = 14695981039346656037ULL;
-  for (std::size_t at = begin; at < end; ++at)
-    if (at < sum_at || at >= sum_at + 8)
-      sum = (sum ^ static_cast<unsigned char>(bytes[at])) * 1099511628211ULL;
-  for (std::size_t i = 0; i < 8; ++i) bytes[sum_at + i] = static_cast<char>(sum >> (8 * i) & 255U);
-}
-
-/// Of the ids' states, and of the tree file behind them.
-void sign(std::string& bytes) {
+/// The checksums of the ids' states, and of the tree file behind them.
+void sign_both(std::string& bytes) {
   if (bytes.size() < 32) return;
   std::uint64_t ids = 0;
   std::memcpy(&ids, bytes.data() + 16, sizeof ids);
   if (ids > bytes.size() - 32) return;
-  sign(bytes, 8, 24, 32 + ids);
-  sign(bytes, 32 + ids + 8, 32 + ids + 32, bytes.size());
+  cairn_test::sign(bytes, 8, 24, 32 + ids);
+  cairn_test::sign(bytes, 32 + ids + 8, 32 + ids + 32, bytes.size());
 }
 
 std::string saved(const Index& index) {
@@ -71,7 +62,7 @@ void check(const Index& index) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   std::string bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
-  if ((data[0] & 128U) != 0) sign(bytes);
+  if ((data[0] & 128U) != 0) sign_both(bytes);
   std::istringstream in(bytes);
   Index index;
   try {

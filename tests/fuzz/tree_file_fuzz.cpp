@@ -22,6 +22,7 @@
 #include <cairn/index/tree_file.hpp>
 
 #include "fuzz/scratch.hpp"
+#include "support/made_up_file.hpp"
 
 namespace {
 
@@ -29,17 +30,6 @@ void require(bool condition, const char* sentence) {
   if (condition) return;
   std::fprintf(stderr, "tree_file_fuzz: %s\n", sentence);
   std::abort();
-}
-
-/// FNV-1a of all but the first eight bytes and itself, as the format says, written into the file.
-void sign(std::string& bytes) {
-  if (bytes.size() < 40) return;
-  std::uint64_t sum = 14695981039346656037ULL;
-  for (std::size_t at = 8; at < bytes.size(); ++at) {
-    if (at >= 32 && at < 40) continue;
-    sum = (sum ^ static_cast<unsigned char>(bytes[at])) * 1099511628211ULL;
-  }
-  for (std::size_t i = 0; i < 8; ++i) bytes[32 + i] = static_cast<char>(sum >> (8 * i) & 255U);
 }
 
 template <class Tree>
@@ -101,7 +91,7 @@ void load(const std::string& bytes, typename Tree::Measure metric = {}) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   if (size == 0) return 0;
   std::string bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
-  if ((data[0] & 128U) != 0) sign(bytes);
+  if ((data[0] & 128U) != 0) cairn_test::sign(bytes, 32);
   switch (data[0] & 7U) {
     case 0:
       load<cairn::KdTree<float, 3>>(bytes);

@@ -13,13 +13,13 @@
 #include <doctest/doctest.h>
 
 #include <cairn/core/random.hpp>
-#include <cairn/io/binary_file.hpp>
 #include <cairn/io/file.hpp>
 
 #include "floor_plan.hpp"
 #include "mapper.hpp"
 #include "outputs.hpp"
 #include "support/folder.hpp"
+#include "support/made_up_file.hpp"
 #include "support/random.hpp"
 
 namespace map_file_test {
@@ -57,14 +57,11 @@ Drive another_drive() {
   return drive;
 }
 
-/// The numbers of a saved map, and a map's file of such numbers: its checksum fits whatever they are.
 std::string numbers_of(const std::filesystem::path& map) {
-  return cairn::read_file(map).substr(32);
+  return cairn_test::held_by(cairn::read_file(map));
 }
 std::string map_of(const std::string& numbers) {
-  cairn::BinaryWriter out;
-  for (const char c : numbers) out.put(c);
-  return out.file("cairngrd", 6);
+  return cairn_test::file_holding(numbers, "cairngrd", 6);
 }
 
 }  // namespace

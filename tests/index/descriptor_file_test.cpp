@@ -17,6 +17,7 @@
 
 #include "index/generators.hpp"
 #include "support/folder.hpp"
+#include "support/made_up_file.hpp"
 #include "support/random.hpp"
 
 namespace descriptor_file_test {
@@ -40,15 +41,11 @@ std::string refusal(const std::string& bytes, const Points& points) {
   return cairn_test::message_of([&] { static_cast<void>(loaded(bytes, points)); });
 }
 
-/// The checksum of a file with other numbers in it, computed here anew: FNV-1a of all but the first eight
-/// bytes and itself.
+/// The file with another number in it and the checksum that belongs to it.
 template <class Number>
 std::string with(std::string bytes, std::size_t at, Number number) {
   std::memcpy(bytes.data() + at, &number, sizeof(number));
-  std::uint64_t sum = 14695981039346656037ULL;
-  for (std::size_t i = 8; i < bytes.size(); ++i)
-    if (i < 48 || i >= 56) sum = (sum ^ static_cast<unsigned char>(bytes[i])) * 1099511628211ULL;
-  for (std::size_t i = 0; i < 8; ++i) bytes[48 + i] = static_cast<char>(sum >> (8 * i) & 255U);
+  cairn_test::sign(bytes, 48);
   return bytes;
 }
 

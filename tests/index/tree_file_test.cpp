@@ -18,6 +18,7 @@
 
 #include "index/generators.hpp"
 #include "support/folder.hpp"
+#include "support/made_up_file.hpp"
 #include "support/random.hpp"
 
 namespace tree_file_test {
@@ -40,16 +41,9 @@ std::string refusal(const std::string& bytes) {
   });
 }
 
-/// The file with other numbers in it and the checksum that belongs to them, computed here anew: FNV-1a of all
-/// but the first eight bytes and itself.
+/// The file with other numbers in it and the checksum that belongs to them.
 std::string signed_anew(std::string bytes) {
-  std::uint64_t sum = 14695981039346656037ULL;
-  for (std::size_t at = 8; at < bytes.size(); ++at) {
-    if (at >= 32 && at < 40) continue;
-    sum ^= static_cast<unsigned char>(bytes[at]);
-    sum *= 1099511628211ULL;
-  }
-  for (std::size_t i = 0; i < 8; ++i) bytes[32 + i] = static_cast<char>(sum >> (8 * i) & 255U);
+  cairn_test::sign(bytes, 32);
   return bytes;
 }
 template <class Number>

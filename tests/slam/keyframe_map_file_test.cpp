@@ -17,6 +17,7 @@
 #include <cairn/slam/keyframe_map_file.hpp>
 
 #include "simulated_arena.hpp"
+#include "support/made_up_file.hpp"
 #include "support/random.hpp"
 
 namespace keyframe_map_file_test {
@@ -44,10 +45,8 @@ KeyframeMap map_of(const std::string& bytes) {
 }
 
 /// The file with other numbers and a checksum that fits.
-std::string sealed(std::string bytes) {
-  BinaryWriter out;
-  for (std::size_t i = cairn::detail::binary_header_bytes; i < bytes.size(); ++i) out.put(bytes[i]);
-  return out.file("testing ", 1);
+std::string sealed(std::string_view bytes) {
+  return cairn_test::file_holding(cairn_test::held_by(bytes), "testing ", 1);
 }
 
 KeyframeMap arena_map(const std::vector<ArenaFrame>& frames, const KeyframeMapOptions& options = {}) {
