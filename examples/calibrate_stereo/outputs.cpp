@@ -135,14 +135,15 @@ example::PlanePlot coverage_plot(const Results& r) {
           "Corners of all views in both images, seen as the image is. Parts without a corner are "
           "extrapolated.",
       .x = {"column", "px"},
-      .y = {"row, upwards", "px"},
-      .curves = {}};
+      .y = {"row", "px"},
+      .curves = {},
+      .downwards = true};
   for (const bool left : {true, false}) {
     example::PlaneCurve dots{left ? "left" : "right", left ? Ink::belief : Ink::measurement, {}, {}, true};
     for (const BoardView& view : r.views)
       for (const cairn::Vector<2>& corner : left ? view.left : view.right) {
         dots.x.push_back(corner(0));
-        dots.y.push_back(-corner(1));
+        dots.y.push_back(corner(1));
       }
     plot.curves.push_back(std::move(dots));
   }

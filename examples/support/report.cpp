@@ -144,6 +144,7 @@ Json plane_head(const char* kind, const Panel& panel) {
   json["x"] = axis(panel.x);
   json["y"] = axis(panel.y);
   if constexpr (requires { panel.third; }) json["third"] = panel.third;
+  if constexpr (requires { panel.downwards; }) json["downwards"] = panel.downwards;
   json["equal_scale"] = panel.equal_scale;
   return json;
 }

@@ -107,6 +107,7 @@ struct PlanePlot {
   bool wide = false;
   bool third = false;  ///< three side by side, where the page has room
   bool equal_scale = true;
+  bool downwards = false;  ///< y grows downwards, as the rows of an image do
 };
 
 /// One position of a film's slider.

@@ -101,7 +101,10 @@ function view(panel, all, body) {
     mode: 2,
     width: 600,
     height: most,
-    scales: { x: { time: false, auto: false, range: bounds.x }, y: { auto: false, range: bounds.y } },
+    scales: {
+      x: { time: false, auto: false, range: bounds.x },
+      y: { auto: false, range: bounds.y, dir: panel.downwards ? -1 : 1 },
+    },
     axes: [horizontal(panel.x), axisOptions(panel.y)],
     legend: { show: false },
     cursor: { drag: { x: false, y: false }, points: { show: false } },
