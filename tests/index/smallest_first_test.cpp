@@ -49,7 +49,7 @@ TEST_SUITE("smallest_first") {
     cairn::Random random(cairn_test::seed(87));
     cairn_test::for_each_processor([&] {
       detail::SmallestFirst smallest;
-      for (const std::size_t count : {1U, 15U, 16U, 17U, 300U, 5000U})
+      for (const std::size_t count : {1U, 15U, 16U, 17U, 128U, 256U, 257U, 300U, 5000U})
         for (const std::uint64_t different : {std::uint64_t{1}, std::uint64_t{3}, std::uint64_t{count}}) {
           std::vector<std::int32_t> numbers(count);
           for (std::int32_t& number : numbers) number = static_cast<std::int32_t>(random.below(different));

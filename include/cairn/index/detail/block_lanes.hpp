@@ -113,6 +113,14 @@ template <class Int>
   return four[0];
 }
 
+/// Of sixteen whole numbers, by halves.
+[[nodiscard, gnu::always_inline]] inline std::int32_t sum_of(const Block<std::int32_t>& numbers) noexcept {
+  Lanes<std::int32_t, 4> quarter[4];
+  std::memcpy(quarter, &numbers, sizeof(numbers));
+  const Lanes<std::int32_t, 4> sums = (quarter[0] + quarter[1]) + (quarter[2] + quarter[3]);
+  return (sums[0] + sums[1]) + (sums[2] + sums[3]);
+}
+
 /// Adds one axis to sixteen sums: at once where the metric is written for any number type, else one by one.
 template <class Real, class M>
 [[gnu::always_inline]] inline void accumulate_block(const M& metric, Block<Real>& sums,

@@ -51,21 +51,25 @@ public:
     shifted_.resize(padded);
     std::uint8_t* own = codes_.data();
     std::int8_t* shifted = shifted_.data();
-    std::fill(own + dim, own + padded, std::uint8_t{0});
-    std::memcpy(own, codes, dim);
+    const std::size_t whole = dim / block_size * block_size;
+    std::fill(own + whole, own + padded, std::uint8_t{0});
+    std::copy(codes + whole, codes + dim, own + whole);
     std::int32_t square = 0;
     with_widest_lanes([&]() CAIRN_INLINED {
       Block<std::int32_t> squares{};
+      // Read by blocks, as they were written a moment ago: a wider load would wait until that is through.
       for (std::size_t a = 0; a < padded; a += block_size) {
-        Block<std::int32_t> numbers;
         Block<std::uint8_t> bytes;
-        load_block<std::int32_t>(own + a, numbers);
-        std::memcpy(&bytes, own + a, sizeof(bytes));
+        std::memcpy(&bytes, a < whole ? codes + a : own + a, sizeof(bytes));
+        // In two steps, which gcc 12 knows how to widen.
+        const auto halves = __builtin_convertvector(bytes, Block<std::int16_t>);
+        const auto numbers = __builtin_convertvector(halves, Block<std::int32_t>);
         squares += numbers * numbers;
+        std::memcpy(own + a, &bytes, sizeof(bytes));
         bytes ^= 128;  // less 128
         std::memcpy(shifted + a, &bytes, sizeof(bytes));
       }
-      for (std::size_t i = 0; i < block_size; ++i) square += squares[i];
+      square = sum_of(squares);
     });
     square_ = square;
   }

@@ -30,7 +30,7 @@ class ByteScale {
 public:
   ByteScale() = default;
   /// Of as many axes as there are lowest coordinates.
-  explicit ByteScale(std::vector<float> low, float unit = 1) : low_(std::move(low)), unit_(unit) {}
+  explicit ByteScale(std::vector<float> low, float unit = 1) : low_(std::move(low)) { set_unit(unit); }
 
   [[nodiscard]] std::size_t dimension() const noexcept { return low_.size(); }
   [[nodiscard]] const std::vector<float>& low() const noexcept { return low_; }
@@ -65,7 +65,7 @@ public:
     Encoded result{std::vector<std::uint8_t>(rows.size())};
     // Whole numbers, and their halves and quarters, are met exactly by the next power of two.
     for (const float unit : {std::exp2(std::ceil(std::log2(finest))), finest}) {
-      unit_ = unit;
+      set_unit(unit);
       result.error = 0;
       for (std::size_t i = 0; i < rows.size(); i += dim) {
         const float error = encode(&rows[i], &result.codes[i]).rounding;
@@ -97,11 +97,12 @@ public:
         encode_block(numbers, low, bytes, misses);
         std::copy_n(bytes, left, codes + axis);
       }
+      exact = smallest<std::int32_t>(misses.bits != Block<std::int32_t>{}) == 0;  // where true, -1
+      if (exact) return;
       for (std::size_t i = 0; i < block_size; ++i) sum += misses.roundings[i];
       for (std::size_t i = 0; i < block_size; ++i) outside += misses.outside[i];
-      for (std::size_t i = 0; i < block_size; ++i) exact = exact && misses.bits[i] == 0;
     });
-    return {exact ? 0 : std::sqrt(sum) * 1.001F + 1e-3F, outside};
+    return exact ? Miss{} : Miss{std::sqrt(sum) * 1.001F + 1e-3F, outside};
   }
 
 private:
@@ -119,7 +120,7 @@ private:
     load_block<float>(low, from);
     // A query may be far away: then it is moved nearer to all bytes alike.
     const Block<float> zero{}, far = zero + 1e15F, top = zero + 255.0F;
-    Block<float> scaled = (numbers - from) / unit_;
+    Block<float> scaled = inverse_ > 0 ? (numbers - from) * inverse_ : (numbers - from) / unit_;
     scaled = scaled < -far ? -far : scaled;
     scaled = scaled > far ? far : scaled;
     Block<float> inside = scaled < zero ? zero : scaled;
@@ -140,8 +141,17 @@ private:
     misses.bits |= (bits[0] ^ bits[1]) | (bits[2] ^ bits[3]);
   }
 
+  /// Dividing by a power of two is multiplying by another, to the last bit, and sooner done.
+  void set_unit(float unit) noexcept {
+    int exponent = 0;
+    const bool power = std::frexp(unit, &exponent) == 0.5F && std::isnormal(1 / unit);
+    unit_ = unit;
+    inverse_ = power ? 1 / unit : 0;
+  }
+
   std::vector<float> low_;
   float unit_ = 1;
+  float inverse_ = 1;  ///< 0 where it is not exact
 };
 
 }}}  // namespace cairn::CAIRN_ABI::detail

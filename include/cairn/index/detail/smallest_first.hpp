@@ -9,9 +9,11 @@
 ///   minima   the smallest of each block:        m0     |     m1      | ...
 ///
 /// When what was sorted has run out, a bound is found that at least ten keys do not exceed, from the minima
-/// alone: sixteen minima of as many parts of the list, lane by lane, and the tenth smallest of those. Blocks
-/// whose minimum is within it give up all keys that are, and these are sorted by counting how many come
-/// before each: sixteen numbers at a time, and hardly a branch that depends on what they are.
+/// alone: sixteen minima of as many parts of the list, lane by lane, and the tenth smallest of those. (Up to
+/// 256 keys have no more minima than lanes; then the parts are lanes of the keys themselves: neighbours in
+/// the list are alike, so their minima would take twice as many keys, and of fewer than ten blocks all.)
+/// Blocks whose minimum is within the bound give up all keys that are, and these are sorted by counting how
+/// many come before each: sixteen numbers at a time, and hardly a branch that depends on what they are.
 ///
 /// O(count) for reset(), O(count / 256 + t log t) each time t numbers run out, with t a few dozen.
 #pragma once
@@ -79,15 +81,16 @@ private:
   }
 
   /// Takes out all numbers up to one that at least `some` do not exceed, if so many are left: of the minima
-  /// of sixteen parts the one of that rank. A few dozen as a rule.
+  /// of sixteen parts the one of that rank. Fifteen to a few dozen as a rule.
   void sort_some() noexcept {
     sorted_count_ = 0;
     given_ = 0;
     with_widest_lanes([&]() CAIRN_INLINED {
       Block<std::int32_t> low = Block<std::int32_t>{} + taken;
-      for (std::size_t g = 0; g < minima_.size(); g += block_size) {
+      const Numbers& parts = minima_.size() <= block_size ? keys_ : minima_;
+      for (std::size_t g = 0; g < parts.size(); g += block_size) {
         Block<std::int32_t> here;
-        load_block<std::int32_t>(minima_.data() + g, here);
+        load_block<std::int32_t>(parts.data() + g, here);
         low = here < low ? here : low;
       }
       Block<std::int32_t> below{};  // how many of the parts are below each
