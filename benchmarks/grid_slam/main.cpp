@@ -74,9 +74,9 @@ double worst(const std::vector<double>& values) {
   return *std::ranges::max_element(values);
 }
 
-/// A map as build/scoreboard/NAME.pgm, beside the numbers.
+/// A map as NAME.pgm, beside the numbers.
 void put(const std::string& name, const grid_slam::MapImage& map) {
-  const std::filesystem::path folder = "build/scoreboard";
+  const std::filesystem::path folder = cairn_bench::output_folder();
   std::filesystem::create_directories(folder);
   cairn::write_pgm(folder / (name + ".pgm"), map.image);
 }

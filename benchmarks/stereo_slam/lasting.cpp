@@ -7,7 +7,6 @@
 #include <chrono>
 #include <cmath>
 #include <cstdint>
-#include <cstdlib>
 #include <ctime>
 #include <filesystem>
 #include <fstream>
@@ -300,8 +299,7 @@ void add_store_rows(Scoreboard& board) {
       .wide = true});
   page.figure(
       {"forest over single tree", example::readable(last_forest / last_single), "", "at 90,000 to 100,000"});
-  const char* named = std::getenv("CAIRN_SCOREBOARD_DIR");
-  const std::filesystem::path folder = named != nullptr ? named : "build/scoreboard";
+  const std::filesystem::path folder = cairn_bench::output_folder();
   std::error_code ignored;
   std::filesystem::create_directories(folder, ignored);
   if (const auto html = page.html()) cairn::write_file_atomically(folder / "stereo_slam_stores.html", *html);

@@ -106,12 +106,12 @@ std::string cpu_name() {
   return "unknown CPU";
 }
 
+}  // namespace
+
 std::filesystem::path output_folder() {
   const char* folder = std::getenv("CAIRN_SCOREBOARD_DIR");
   return folder != nullptr ? folder : "build/scoreboard";
 }
-
-}  // namespace
 
 std::optional<int> answer(int argc, char** argv, const std::string& program,
                           std::initializer_list<std::string_view> parts) {

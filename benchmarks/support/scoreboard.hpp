@@ -18,6 +18,7 @@
 /// with "met" true, false, or null where nothing was measured.
 #pragma once
 
+#include <filesystem>
 #include <initializer_list>
 #include <optional>
 #include <string>
@@ -35,6 +36,9 @@ using enum Better;
 /// (2); nothing where it is to run. The parts named are a program's to find.
 std::optional<int> answer(int argc, char** argv, const std::string& program,
                           std::initializer_list<std::string_view> parts = {});
+
+/// Where scoreboards put what they make: $CAIRN_SCOREBOARD_DIR, build/scoreboard by default.
+std::filesystem::path output_folder();
 
 /// Hands everything printed to whoever reads it; says on standard error where that fails, and returns false.
 bool flush_standard_output(const std::string& program);
