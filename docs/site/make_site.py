@@ -131,7 +131,7 @@ class Links(html.parser.HTMLParser):
                 self.ids.add(attributes[name])
         if tag == "a" and attributes.get("href"):
             self.links.append(attributes["href"])
-        elif tag == "link" and attributes.get("href"):
+        elif tag in ("link", "image") and attributes.get("href"):
             self.loads.append(attributes["href"])
         elif attributes.get("src"):
             self.loads.append(attributes["src"])
@@ -262,32 +262,64 @@ def lesson_folders(course):
     return sorted(course.glob("[0-9][0-9]_*"))
 
 
+# A picture of a lesson's figure; all stand in one image, row by row, since starting a browser takes longer than all of them.
+FIGURE_WIDTH, FIGURE_HEIGHT, FIGURES_IN_A_ROW = 640, 720, 4
+
+# The figure of a lesson's page that stands for it; the first, where none is named.
+SHOWN = {"12_visual_slam": 2}
+
+
+def place_of(index):
+    return index % FIGURES_IN_A_ROW * FIGURE_WIDTH, index // FIGURES_IN_A_ROW * FIGURE_HEIGHT
+
+
+def size_of(count):
+    return min(count, FIGURES_IN_A_ROW) * FIGURE_WIDTH, -(-count // FIGURES_IN_A_ROW) * FIGURE_HEIGHT
+
+
+def lesson_pictures(browser, folders, target):
+    """A picture of all lessons' figures as an image; whether there is one."""
+    frames = ""
+    for index, folder in enumerate(folders):
+        left, top = place_of(index)
+        shown = f"{(folder / 'index.html').as_uri()}?theme=light&figure={SHOWN.get(folder.name, 1)}"
+        frames += (f'<iframe src="{html.escape(shown)}" width="{FIGURE_WIDTH}" height="{FIGURE_HEIGHT}" scrolling="no"'
+                   f' style="position: absolute; left: {left}px; top: {top}px; border: 0"></iframe>\n')
+    with tempfile.TemporaryDirectory() as place:
+        sheet = pathlib.Path(place) / "figures.html"
+        sheet.write_text(f'<!doctype html>\n<body style="margin: 0">\n{frames}', encoding="utf-8")
+        return screenshot(browser, sheet, "", target, *size_of(len(folders)))
+
+
 def lesson_pages(site, course, browsing):
-    """Copies each lesson's page, and has a picture of its first figure taken; returns, by name, what will say whether there is one."""
-    browser = chromium()
-    if browser is None:
-        print("docs: no chromium, so the lessons go without pictures", file=sys.stderr)
-    pictures = {}
+    """Copies each lesson's page, and has a picture of their figures taken; returns what will say whether there is one, or nothing
+    where there is no browser."""
+    targets = []
     for folder in lesson_folders(course):
         target = site / "lessons" / folder.name
         if not (folder / "index.html").is_file():
             sys.exit(f"docs: {folder} has no page: the lessons were built without npm (scripts/install demo)")
         shutil.copytree(folder, target, ignore=shutil.ignore_patterns("mistakes"), dirs_exist_ok=True)
-        if browser:
-            pictures[folder.name] = browsing.submit(screenshot, browser, target / "index.html",
-                                                    f"?theme=light&figure={SHOWN.get(folder.name, 1)}", target / "figure.png", 640, 720)
-    return pictures
+        targets.append(target)
+    browser = chromium()
+    if browser is None:
+        print("docs: no chromium, so the lessons go without pictures", file=sys.stderr)
+        return None
+    return browsing.submit(lesson_pictures, browser, targets, site / "lessons" / "figures.png")
 
 
-def gallery(site, course, pictures):
+def gallery(site, course, with_pictures):
     """The list of the lessons, with the pictures that are being taken."""
-    items = []
-    for folder in lesson_folders(course):
+    items, folders = [], lesson_folders(course)
+    width, height = size_of(len(folders))
+    for index, folder in enumerate(folders):
         about = subprocess.run([str(ROOT / "build/release/examples" / folder.name), "--about"], capture_output=True, text=True,
                                check=True).stdout.splitlines()
         picture = ""
-        if folder.name in pictures:
-            picture = f'<img src="lessons/{folder.name}/figure.png" alt="A figure of the lesson\'s page" width="640" height="720" loading="lazy"/>'
+        if with_pictures:
+            left, top = place_of(index)
+            picture = (f'<svg role="img" aria-label="A figure of the lesson\'s page" viewBox="{left} {top} {FIGURE_WIDTH} {FIGURE_HEIGHT}">'
+                       f'<image href="lessons/figures.png" width="{width}" height="{height}"/></svg>')
         source = page.source_page(f"examples/{folder.name}/main.cpp")
         items.append(f'<li>{picture}<h2>{html.escape(about[0])}</h2><p>{html.escape(about[1])}</p>'
                      f'<p><a href="lessons/{folder.name}/index.html">Its page</a>, <a href="{source}">the program</a></p></li>')
@@ -406,10 +438,6 @@ def phone_faults(site):
     return html.unescape(found.group(1)).splitlines()
 
 
-# The figure of a lesson's page that stands for it; the first, where none is named.
-SHOWN = {"12_visual_slam": 2}
-
-
 def picture(report, figure, size, target):
     width, height = size.split("x")
     if not screenshot(chromium(), pathlib.Path(report), f"?theme=light&figure={figure}", pathlib.Path(target).resolve(), width, height):
@@ -434,12 +462,13 @@ def main():
         faults = run_doxygen(site)
         tidied(site)
         figures(site)
-        gallery(site, course, pictures)
+        gallery(site, course, pictures is not None)
         find_page(site)
         source_pages(site)
         mended(site)
         on_a_phone = browsing.submit(phone_faults, site)
-        faults += [f"there is no picture of {name}" for name, taken in pictures.items() if not taken.result()]
+        if pictures is not None and not pictures.result():
+            faults.append("there is no picture of the lessons")
         faults += [*readme_faults(), *link_faults(site), *on_a_phone.result()]
     for fault in faults:
         print(f"docs: {fault}", file=sys.stderr)
