@@ -192,7 +192,7 @@ FrameError frame_error(const cairn::SE3& estimate, const cairn::SE3& truth) {
 }
 
 std::optional<double> pose_nees(const FrameRecord& frame) {
-  constexpr double gauge = 1e-10;  // variance
+  constexpr double gauge = 2e-12;  // variance; the first keyframe's is 1e-12
   if (!frame.truth || !frame.tracked || !(frame.covariance.diagonal().minCoeff() > gauge))
     return std::nullopt;
   return cairn::normalised_squared(cairn::local(frame.T_world_camera, *frame.truth), frame.covariance);

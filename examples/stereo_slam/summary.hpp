@@ -138,7 +138,7 @@ struct Timing {
 [[nodiscard]] FrameError frame_error(const cairn::SE3& estimate, const cairn::SE3& truth);
 
 /// NEES of a frame's pose; nothing without a truth, where it was lost, or where its covariance is none or
-/// that of the gauge (smaller than any camera's: 10 um, 10 urad).
+/// that of the gauge (a variance below 2e-12 m^2 or rad^2, KeyframeMapOptions::first_sigma being 1e-6).
 [[nodiscard]] std::optional<double> pose_nees(const FrameRecord& frame);
 
 /// For every pose the nearest earlier one at the same true place, compared by
