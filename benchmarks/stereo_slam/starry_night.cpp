@@ -53,15 +53,11 @@ struct Outcome {
   std::size_t landmarks = 0, frames = 0, located = 0, keyframes = 0, first = 0;
 };
 
-/// Of one number over simulated records.
-struct Spread {
-  double mean = 0, least = 0, most = 0;
-};
-
 struct Results {
   Outcome stated;     ///< with the noise that the record states
   Outcome by_images;  ///< with that which its images show
-  Spread stated_alone, by_images_shape;
+  /// Of records simulated with the one noise and the other.
+  cairn::RunningMoments stated_alone, by_images_shape;
   double sigma = 0;  ///< of the images [pixels]
 };
 
@@ -357,18 +353,12 @@ Outcome map_and_follow(const Record& record) {
 
 /// Of records simulated with the noise that is assumed: a NEES is what it should be where its mean is, and of
 /// one record no further off than these are.
-Spread spread_of(const Record& record, double Outcome::* number) {
+cairn::RunningMoments over_simulated(const Record& record, double Outcome::* number) {
   constexpr std::uint64_t runs = 40;
-  Spread spread;
   cairn::RunningMoments values;
-  for (std::uint64_t seed = 1; seed <= runs; ++seed) {
-    const double value = map_and_follow(record.simulated(seed)).*number;
-    values.add(value);
-    spread.least = seed == 1 ? value : std::min(spread.least, value);
-    spread.most = std::max(spread.most, value);
-  }
-  spread.mean = values.mean();
-  return spread;
+  for (std::uint64_t seed = 1; seed <= runs; ++seed)
+    values.add(map_and_follow(record.simulated(seed)).*number);
+  return values;
 }
 
 std::optional<Results> run() {
@@ -378,11 +368,11 @@ std::optional<Results> run() {
   Record record{example::MatFile(*path)};
   Results results;
   results.stated = map_and_follow(record);
-  results.stated_alone = spread_of(record, &Outcome::landmark_nees);
+  results.stated_alone = over_simulated(record, &Outcome::landmark_nees);
   results.sigma = record.images_sigma();
   record.assume(results.sigma);
   results.by_images = map_and_follow(record);
-  results.by_images_shape = spread_of(record, &Outcome::shape_nees);
+  results.by_images_shape = over_simulated(record, &Outcome::shape_nees);
   return results;
 }
 
@@ -409,9 +399,9 @@ void add_starry_night_rows(cairn_bench::Scoreboard& board) {
   };
   const auto text = [](double value) { return cairn::shortest(std::round(1e3 * value) / 1e3); };
   const auto off = [](double nees, double due) { return std::max(nees / due, due / nees); };
-  const auto simulated = [&](const Spread& s) {
-    return "40 records simulated with that noise: " + text(s.mean) + " (" + text(s.least) + " to " +
-           text(s.most) + ")";
+  const auto simulated = [&](const cairn::RunningMoments& of) {
+    return std::to_string(of.count()) + " records simulated with that noise: " + text(of.mean()) + " (" +
+           text(of.smallest()) + " to " + text(of.largest()) + ")";
   };
   std::array<std::string, 5> notes;
   if (done) {
