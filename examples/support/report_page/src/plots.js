@@ -29,6 +29,13 @@ export function horizontal(axis) {
   return { ...axisOptions(axis), size: 34, space: 60 };
 }
 
+/** 1, 2 and 5 times the powers of ten: an axis of steps, trees or numbers of a state has no tick at 2.5. */
+const wholeSteps = Array.from({ length: 16 }, (_, power) => [1, 2, 5].map((factor) => factor * 10 ** power)).flat();
+
+function linear(axis, values) {
+  return values.every(Number.isInteger) ? { ...horizontal(axis), incrs: wholeSteps } : horizontal(axis);
+}
+
 /** 1, 2 and 5 times the powers of ten from low to high. */
 function logarithmicTicks(_, __, low, high) {
   const ticks = [];
@@ -112,7 +119,7 @@ export function lines(panel, body) {
       x: panel.logarithmic_x ? { time: false, distr: 3, range: (_, low, high) => [low, high] } : { time: false },
       y: panel.logarithmic ? { distr: 3, range: logarithmicRange } : { range: linearRange },
     },
-    axes: [panel.logarithmic_x ? logarithmic(panel.x) : horizontal(panel.x), axisOptions(panel.y)],
+    axes: [panel.logarithmic_x ? logarithmic(panel.x) : linear(panel.x, panel.x_values), axisOptions(panel.y)],
     cursor: { sync: { key: pairing.key, setSeries: false }, focus: { prox: 30 }, points: { size: 6 } },
     legend: { markers: { show: false } },
     bands: panel.bands.map((band, i) => ({ series: [2 * i + 1, 2 * i + 2], fill: () => tint(band.ink, 16) })),
