@@ -4,7 +4,7 @@
 // 01 Building height: how much to believe a new number.
 //
 // STORY  You measure the height of a building with a poor altimeter, ten times. The building does not change.
-// After each reading you want the best height so far, and how far off it may be, without keeping old ones.
+// After each reading a filter knows the best height so far, and how far off it may be, and keeps no old ones.
 //
 //   x   height of the building, as believed       [m]      z   one reading of the altimeter           [m]
 //   p   variance of that belief                   [m^2]    r   variance of a reading's error, (5 m)^2 [m^2]
@@ -15,25 +15,22 @@
 //   the same, recursively   x_n = x_{n-1} + 1/n (z_n - x_{n-1})
 //   Kalman filter           k = p / (p + r),   x <- x + k (z - x),   p <- (1 - k) p
 // (R. E. Kalman, "A New Approach to Linear Filtering and Prediction Problems", 1960, for one state that
-// stays.) The recursive mean gives reading n the weight 1/n. The filter asks instead who is to be trusted
-// more, and its gain is a ratio of trusts: doubt about the belief over all doubt. A first guess is then just
-// one more reading. Readings and results are A. Becker's, https://www.kalmanfilter.net/kalman1d.html: guess
-// 60 m, 15 m off or so; at the end 49.57 m with a variance of 2.47 m^2.
+// stays.) The recursive mean gives reading n the weight 1/n. The filter's gain is a ratio of doubts: doubt
+// about the belief over all doubt, so that whoever is surer counts more; p falls, since two readings know
+// more than one. A first guess is then just one more reading. Readings and results are A. Becker's,
+// https://www.kalmanfilter.net/kalman1d.html: guess 60 m; at the end 49.57 m with a variance of 2.47 m^2.
 //
 // LOOK AT  the blue funnel: it closes fast at first, then slowly. The black line should lie outside one time
-// in twenty; here it never does. The gain falls like 1/n. The last plot tries a thousand other buildings.
+// in twenty: not in ten readings. The gain falls like 1/n. The last plot tries a thousand other buildings.
 //
 // CHANGE THIS, one at a time (answers at the end of the file). The two published figures then turn red.
 //   1. guess_variance = 1: you are sure of your wrong guess. Where does the estimate end?
 //   2. guess_variance = 1e9: you know nothing. Which other curve of the first plots does the filter become?
 //   3. Append 500 to `readings`, a bird in the beam. What would have had to notice?
 #include <cmath>
-#include <cstddef>
 #include <numbers>
-#include <vector>
 
 #include <cairn/core/random.hpp>
-#include <cairn/core/statistics.hpp>
 #include <cairn/filter/kalman.hpp>
 #include <cairn/models/sensor.hpp>
 
@@ -50,13 +47,15 @@ int main(int argc, char** argv) {
   example::Lesson lesson(
       {.name = "01_building_height",
        .title = "01 Building height",
-       .sentence = "The gain of a filter is a ratio of trusts: doubt about the belief over all doubt.",
+       .sentence = "The gain of a filter is a ratio of doubts: doubt about the belief over all doubt.",
        .steps = 1000,
        .least_steps = 100,
        .mistakes = {{"sigma-for-variance",
-                     "deviation (5 m) in place of variance (25 m^2); paparazzi's hf_float.c (#3661)"},
+                     "deviation (5 m) in place of variance (25 m^2); paparazzi's hf_float.c (#3661)",
+                     "The height looks fine, its funnel is too narrow: errors of 4 own sigmas are usual."},
                     {"variance-stays",
-                     "the variance never falls, nor does the gain; jjviscomi/kalman-filter until PR #2"}}},
+                     "the variance never falls, nor does the gain; jjviscomi/kalman-filter until PR #2",
+                     "It follows the last reading to the end, and its funnel never closes."}}},
       argc, argv);
 
   // What the filter is told about a reading, and one reading taken in.
@@ -102,7 +101,7 @@ int main(int argc, char** argv) {
     expected.push_back(std::exp(-0.02 * bin * bin) / std::sqrt(2 * std::numbers::pi));
   }
 
-  lesson.verdict("mean, recursive less direct", mean - sum / table.back()[0], -1e-12, 1e-12, "No list kept");
+  lesson.verdict("mean, recursive less direct", mean - sum / table.back()[0], -1e-12, 1e-12, "Keeps no list");
   lesson.verdict("height after ten readings", belief.mean(0), 49.565, 49.575, "Published: 49.57 m");
   lesson.verdict("its variance", belief.covariance(0, 0), 2.465, 2.475, "Published: 2.47 m^2");
   lesson.verdict("NEES", total / houses, cairn::chi_square_mean_band(1, houses, 0.99999),

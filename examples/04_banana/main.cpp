@@ -7,20 +7,20 @@
 // by 15 degrees or so. Where are you? Somewhere on an arc; many such drives end in the shape of a banana.
 //
 //   x, y  place [m]     theta  heading from east, 90 degrees, sigma s [rad]        v  speed, 1 +- 0.02 [m/s]
-//   P     covariance of these four                     G  Jacobian of f            dt  time driven, 1 [s]
+//   P     covariance of these four                     F  Jacobian of f            dt  time driven, 1 [s]
 //   xx, yy  variances of x and of y [m^2]              E  mean over all drives     f   one drive
 // EQUATIONS  f:  x <- x + v cos(theta) dt,   y <- y + v sin(theta) dt
-//   extended    mean <- f(mean),  P <- G P G'       as if f were straight near the mean
-//   unscented   moments of a few points' images     as if the result were Gaussian
+//   extended    mean <- f(mean),  P <- F P F'       as if f were straight near the mean
+//   unscented   mean, P of a few points sent by f   as if the result were Gaussian
 //   particles   every one goes through f            as if there were enough of them
-//   exact       E y = exp(-s^2/2),   E x^2 and E y^2 = (1 + 0.02^2) (1 -+ exp(-2 s^2)) / 2
+//   exact       E y = exp(-s^2/2),   xx = (1 + 0.02^2) (1 - exp(-2 s^2)) / 2
+//               yy = (1 + 0.02^2) (1 + exp(-2 s^2)) / 2 - (E y)^2
 // (Example: S. Julier, J. Uhlmann, "Unscented filtering and nonlinear estimation", Proc. IEEE 92, 2004.)
 // LOOK AT  the film while the compass gets worse. The extended filter's ellipse grows sideways only: a line
-// does not know that turning either way leads south. The unscented one has the right size and place.
+// does not know that turning either way leads south. The unscented one has the spread, though not the bend.
 // CHANGE THIS (answers at the end of the file)
 //   1. Give Unscented alpha = 1e-3, beta = 2, kappa = 0 (how its points lie and weigh), as many do. And yy?
-//   2. --steps 500, 100000: what becomes of the band for particles' error of y? How many particles would it
-//   take for an error as small as the unscented's?
+//   2. --steps 500, 100000: what becomes of the band for particles' error of y? How many for the unscented's?
 //   3. Tell all three that x = 0.5 m (docs/course.md, "Lesson 04"). Which then knows that y is 0.87 m?
 #include <cmath>
 #include <numbers>
@@ -33,7 +33,7 @@
 
 #include "support/lesson.hpp"
 
-using example::column, example::Ink, example::PlaneCurve, example::readable, example::Rows;
+using cairn::Matrix, example::column, example::Ink, example::PlaneCurve, example::readable, example::Rows;
 using State = cairn::Vector<4>;  // x, y, theta, v
 using Belief = cairn::Gaussian<State>;
 constexpr double degree = std::numbers::pi / 180, north = 90 * degree;
@@ -44,21 +44,18 @@ struct Drive {
   [[nodiscard]] State propagate(const State& s, const Control&, double dt) const {
     return {s(0) + s(3) * std::cos(s(2)) * dt, s(1) + s(3) * std::sin(s(2)) * dt, s(2), s(3)};
   }
-  [[nodiscard]] cairn::Matrix<4> jacobian(const State& s, const Control&, double dt) const {
-    cairn::Matrix<4> g = cairn::Matrix<4>::Identity();
-    g.row(0) << 1, 0, -s(3) * std::sin(s(2)) * dt, std::cos(s(2)) * dt;
-    g.row(1) << 0, 1, s(3) * std::cos(s(2)) * dt, std::sin(s(2)) * dt;
-    return g;
+  [[nodiscard]] Matrix<4> jacobian(const State& s, const Control&, double dt) const {
+    Matrix<4> f = Matrix<4>::Identity();
+    f.row(0) << 1, 0, -s(3) * std::sin(s(2)) * dt, std::cos(s(2)) * dt;
+    f.row(1) << 0, 1, s(3) * std::cos(s(2)) * dt, std::sin(s(2)) * dt;
+    return f;
   }
-  [[nodiscard]] cairn::Matrix<4> noise(const State&, const Control&, double) const {
-    return cairn::Matrix<4>::Zero();
-  }
+  [[nodiscard]] Matrix<4> noise(const State&, const Control&, double) const { return Matrix<4>::Zero(); }
 };
 
 bool inside(const Belief& b, const State& truth) {  // 2 sigma of the place
-  const cairn::Matrix<2> place = b.covariance.topLeftCorner<2, 2>();
   const cairn::Vector<2> off = (truth - b.mean).head<2>();
-  return cairn::normalised_squared(off, place).value_or(9) < 4;
+  return cairn::normalised_squared(off, Matrix<2>(b.covariance.topLeftCorner<2, 2>())).value_or(9) < 4;
 }
 
 void demand(cairn::Status status) {
@@ -72,9 +69,12 @@ int main(int argc, char** argv) {
        .sentence = "Every filter assumes something: a straight line, a Gaussian, or enough particles.",
        .steps = 2000,
        .least_steps = 500,
-       .mistakes = {{"variance-for-sigma", "particles are drawn with s^2 for s; PythonRobotics #236"},
-                    {"uniform", "drawn evenly from -s to s; manif's demos"},
-                    {"element-wise", "G * P * G' number by number; PythonRobotics until PR #258"}}},
+       .mistakes = {{"variance-for-sigma", "particles are drawn with s^2 for s; PythonRobotics #236",
+                     "The dashed ellipse is too small, up to 57 degrees."},
+                    {"uniform", "drawn evenly from -s to s; manif's demos",
+                     "The dashed ellipse is too small: no particle is beyond one sigma."},
+                    {"element-wise", "F * P * F' number by number; PythonRobotics until PR #258",
+                     "The red ellipse has no width, and is not drawn."}}},
       argc, argv);
   cairn::Random random(lesson.seed()), world(lesson.seed(), 1);
   const Drive drive;
@@ -98,9 +98,9 @@ int main(int argc, char** argv) {
     demand(cairn::Extended{}.predict(extended, drive, 1));
     demand(cairn::Unscented{.points = {.alpha = 1, .beta = 0, .kappa = -1}}.predict(unscented, drive, 1));
     demand(cairn::ParticleFilter{}.predict(particles, drive, 1, random));
-    const cairn::Matrix<4> G = drive.jacobian(prior.mean, {}, 1);
+    const Matrix<4> F = drive.jacobian(prior.mean, {}, 1);
     if (lesson.mistake("element-wise"))
-      extended.covariance = G.cwiseProduct(prior.covariance).cwiseProduct(G.transpose());
+      extended.covariance = F.cwiseProduct(prior.covariance).cwiseProduct(F.transpose());
     const Belief swarm = cairn::moments(particles), *all[] = {&extended, &unscented, &swarm};
     PlaneCurve drives{.name = "real drives", .ink = Ink::truth, .dots = true};
     std::vector<double> held{double(degrees), 0, 0, 0, 86.5};  // percent inside 2 sigma
@@ -111,37 +111,37 @@ int main(int argc, char** argv) {
     }
     shares.push_back(held);
     const auto outline = [](const char* name, Ink ink, const Belief& b) {
-      const cairn::Matrix<4>& P = b.covariance;
+      const Matrix<4>& P = b.covariance;
       return example::ellipse(name, ink, {b.mean(0), b.mean(1)}, {P(0, 0), P(0, 1), P(1, 1)});
     };
     auto dashed = outline("particles", Ink::teal, swarm);
     dashed.dashed = true, dashed.filled = false;
     const auto straight = outline("extended", Ink::wrong, extended);
     const auto round = outline("unscented", Ink::belief, unscented);
-    const auto words =
-        "extended holds " + readable(held[1]) + " % of them, unscented " + readable(held[2]) + " %";
+    const auto words = "inside: extended " + readable(held[1]) + " %, unscented " + readable(held[2]) + " %";
     film.frames.push_back({held[0], words, {drives, straight, round, dashed}});
     if (degrees != 15) continue;
     const double y = std::exp(-s * s / 2), wave = std::exp(-2 * s * s), root = std::sqrt(lesson.steps());
     const double xx = 1.0004 * (1 - wave) / 2, yy = 1.0004 * (1 + wave) / 2 - y * y;
     const double off = 5 * std::sqrt(yy) / root, share = 7 / root;  // 5 sigma of mean, variance
     lesson.verdict("extended, variance of x", extended.covariance(0, 0), s * s - 1e-9, s * s + 1e-9,
-                   "s^2, as a line has it; exact: " + readable(xx));
+                   "As wrong as a line is: s^2. Exact: " + readable(xx));
     lesson.verdict("unscented, error of y", unscented.mean(1) - y, -1e-4, 1e-4, "Exact: exp(-s^2 / 2)");
     lesson.verdict("unscented, variance of y", unscented.covariance(1, 1), 0.95 * yy, 1.05 * yy);
     lesson.verdict("particles, error of y", swarm.mean(1) - y, -off, off, "5 sigma of their mean");
     lesson.verdict("particles, variance of x", swarm.covariance(0, 0), xx * (1 - share), xx * (1 + share));
   }
   lesson.add(film);
-  lesson.add(example::LinePlot{.title = "How many real drives end in the ellipse?",
-                               .caption = "Of a Gaussian 86.5 %. The straight, thin red one loses the bend.",
-                               .x = {"compass sigma", "degrees"},
-                               .y = {"inside 2 sigma", "%"},
-                               .x_values = column(shares, 0),
-                               .curves = {{"expected", Ink::truth, column(shares, 4), true},
-                                          {"extended", Ink::wrong, column(shares, 1)},
-                                          {"unscented", Ink::belief, column(shares, 2)},
-                                          {"particles", Ink::teal, column(shares, 3), true}}});
+  lesson.add(
+      example::LinePlot{.title = "How many real drives end in the ellipse?",
+                        .caption = "Of a Gaussian 86.5 %. A banana is none: the red one loses the bend.",
+                        .x = {"compass sigma", "degrees"},
+                        .y = {"inside 2 sigma", "%"},
+                        .x_values = column(shares, 0),
+                        .curves = {{"expected", Ink::truth, column(shares, 4), true},
+                                   {"extended", Ink::wrong, column(shares, 1)},
+                                   {"unscented", Ink::belief, column(shares, 2)},
+                                   {"particles", Ink::teal, column(shares, 3), true}}});
   lesson.csv("shares", {"compass_deg", "extended", "unscented", "particles", "expected"}, shares);
   return lesson.finish();
 }

@@ -109,7 +109,10 @@ Lesson::Lesson(LessonInfo info, int argc, char** argv)
     std::exit(flush_standard_output(info_.name) ? exit_well : exit_mistake);
   }
   for (const Mistake& each : info_.mistakes)
-    if (each.name == planted_) report_.note("A mistake was planted. " + each.name + ": " + each.what);
+    if (each.name == planted_) {
+      report_.note("A mistake was planted. " + each.name + ": " + each.what);
+      report_.note((each.look.empty() ? "" : each.look + ' ') + "Captions are those of the page without it.");
+    }
   if (!planted_.empty()) say("planted mistake: " + planted_);
 }
 

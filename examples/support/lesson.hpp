@@ -7,7 +7,9 @@
 ///
 ///   example::Lesson lesson({.name = "04_banana", .title = "...", .sentence = "...", .steps = 100,
 ///                           .least_steps = 10, .most_steps = 1000,
-///                           .mistakes = {{"wrap", "residual not wrapped: seen in ..."}}}, argc, argv);
+///                           .mistakes = {{"wrap", "residual not wrapped: seen in ...", "It loses the way at
+///                           180 degrees."}}},
+///                          argc, argv);
 ///   ...
 ///   lesson.verdict("NEES", nees.mean(), band.low, band.high, "3 where the filter knows how wrong it is");
 ///   lesson.add(example::PlaneFilm{...});
@@ -36,6 +38,7 @@ namespace example {
 struct Mistake {
   std::string name;  ///< "drop-correlations"
   std::string what;  ///< one line: the bug, and where it was really seen
+  std::string look;  ///< a sentence: what it does to the page
 };
 
 struct LessonInfo {

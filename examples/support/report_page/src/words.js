@@ -12,9 +12,9 @@ const words = [
   ['landmark', /\blandmarks?\b/i, 'a point (or line, or post) of the world that the map holds'],
   ['N_eff', /\bN_eff\b/, 'effective number of particles, 1 over the sum of their squared weights: how many carry the weight'],
   ['NEES', /\bNEES\b/, 'normalised estimation error squared: the squared error over what the filter expects of it. Its mean is the number of '
-    + 'estimated numbers where the filter knows how wrong it is; larger: too sure'],
+    + 'estimated numbers where the filter knows how wrong it is; larger: too sure; smaller: too unsure'],
   ['NIS', /\bNIS\b/, 'normalised innovation squared: the squared surprise of a measurement over what the filter expects of it. Its mean is the '
-    + 'number of measured numbers where the filter is right; larger: too sure'],
+    + 'number of measured numbers where the filter is right; larger: too sure; smaller: too unsure'],
   ['odometry', /\bodometry\b/i, 'motion from step to step, by wheels or by images, added up'],
   ['particles', /\bparticles?\b/i, 'many guesses of the state or the path, each with a weight; the measurements say which to keep'],
   ['precision', /\bprecision\b/i, 'the share of what was answered that is right'],
