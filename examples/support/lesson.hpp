@@ -36,9 +36,9 @@ namespace example {
 
 /// A bug that can be planted with --mistake=NAME.
 struct Mistake {
-  std::string name;  ///< "drop-correlations"
-  std::string what;  ///< one line: the bug, and where it was really seen
-  std::string look;  ///< a sentence: what it does to the page
+  std::string name;       ///< "drop-correlations"
+  std::string what;       ///< one line: the bug, and where it was really seen
+  std::string look = {};  ///< a sentence: what it does to the page
 };
 
 struct LessonInfo {
