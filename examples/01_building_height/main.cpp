@@ -18,10 +18,10 @@
 // stays.) The recursive mean gives reading n the weight 1/n. The filter's gain is a ratio of doubts: doubt
 // about the belief over all doubt, so that whoever is surer counts more; p falls, since two readings know
 // more than one. A first guess is then just one more reading. Readings and results are A. Becker's,
-// https://www.kalmanfilter.net/kalman1d.html: guess 60 m; at the end 49.57 m with a variance of 2.47 m^2.
+// https://www.kalmanfilter.net/kalman1d.html: guess (60 +- 15) m; at the end 49.57 m, variance 2.47 m^2.
 //
 // LOOK AT  the blue funnel: it closes fast at first, then slowly. The black line should lie outside one time
-// in twenty: not in ten readings. The gain falls like 1/n. The last plot tries a thousand other buildings.
+// in twenty, so hardly in ten. The gain falls like 1/n. The last plot tries a thousand other buildings.
 //
 // CHANGE THIS, one at a time (answers at the end of the file). The two published figures then turn red.
 //   1. guess_variance = 1: you are sure of your wrong guess. Where does the estimate end?
@@ -52,7 +52,7 @@ int main(int argc, char** argv) {
        .least_steps = 100,
        .mistakes = {{"sigma-for-variance",
                      "deviation (5 m) in place of variance (25 m^2); paparazzi's hf_float.c (#3661)",
-                     "The height looks fine, its funnel is too narrow: errors of 4 own sigmas are usual."},
+                     "The height looks fine, its funnel is too narrow: errors of 2 own sigmas are usual."},
                     {"variance-stays",
                      "the variance never falls, nor does the gain; jjviscomi/kalman-filter until PR #2",
                      "It follows the last reading to the end, and its funnel never closes."}}},
@@ -101,7 +101,7 @@ int main(int argc, char** argv) {
     expected.push_back(std::exp(-0.02 * bin * bin) / std::sqrt(2 * std::numbers::pi));
   }
 
-  lesson.verdict("mean, recursive less direct", mean - sum / table.back()[0], -1e-12, 1e-12, "Keeps no list");
+  lesson.verdict("mean, recursive less direct", mean - sum / table.back()[0], -1e-12, 1e-12, "The same");
   lesson.verdict("height after ten readings", belief.mean(0), 49.565, 49.575, "Published: 49.57 m");
   lesson.verdict("its variance", belief.covariance(0, 0), 2.465, 2.475, "Published: 2.47 m^2");
   lesson.verdict("NEES", total / houses, cairn::chi_square_mean_band(1, houses, 0.99999),
@@ -135,7 +135,7 @@ int main(int argc, char** argv) {
       .caption = "Errors over many buildings, each divided by the deviation that the filter gave for it. "
                  "A hill wider than the normal curve is a filter too sure of itself.",
       .x = {"error / own sigma"},
-      .y = {"density"},
+      .y = {"share per sigma"},
       .x_values = in_sigmas,
       .curves = {{"expected", Ink::truth, expected, true}, {"found", Ink::belief, found}}});
   lesson.csv("readings", {"n", "z", "mean", "one_over_n", "gain", "height", "low", "high", "truth"}, table);

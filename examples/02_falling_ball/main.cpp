@@ -13,12 +13,12 @@
 //       gains each second [(m/s^2)^2 / s]                   K   gain: a share of the surprise for each of x
 // EQUATIONS (Bar-Shalom, Li, Kirubarajan, "Estimation with Applications to Tracking and Navigation", 2001)
 //   x <- F x,  P <- F P F' + Q,   F = [1 dt dt^2/2; 0 1 dt; 0 0 1]                        (section 6.2.3)
-//   Q = q [dt^5/20 dt^4/8 dt^3/6; dt^4/8 dt^3/3 dt^2/2; dt^3/6 dt^2/2 dt]      (gusts, summed up over dt)
-//   S = H P H' + sigma^2,  K = P H' / S,  x <- x + K (z - h),  P <- (1 - K H) P    (01, for three numbers)
+//   Q = q [dt^5/20 dt^4/8 dt^3/6; dt^4/8 dt^3/3 dt^2/2; dt^3/6 dt^2/2 dt]      (gusts, integrated to each)
+//   S = H P H' + sigma^2,  K = P H' / S,  x <- x + K (z - h),  P <- (1 - K H) P    (P H': P's first column)
 //   NIS  = (z - h)^2 / S                   surprise over expected surprise; its mean is 1   (section 5.4)
 //   NEES = (x - truth)' P^-1 (x - truth)   error over expected error; its mean is 3, for 3 numbers
-// LOOK AT  the film while you move q: too small, and the error leaves the band; too large, and the estimate
-// follows the radar's errors. Then the plot: at half and at twice q NIS is out of its band, the error flat.
+// LOOK AT  the film while you move q: too small, and the error leaves the band; too large, and it gets
+// as jagged as the radar. Then the plot: at half and at twice q NIS is out of its band, the error flat.
 // CHANGE THIS (answers at the end of the file)
 //   1. Tell `radar` in filter() a sigma of 1 m, twice the true one. At what q does NIS cross 1 (sweep.csv)?
 //   2. readings = 10, and --steps 50. How wide is the band of NIS, and can it still tell q from 2 q?
@@ -96,7 +96,7 @@ int main(int argc, char** argv) {
   while (drops.size() < lesson.steps()) drops.push_back(simulate(random));
 
   example::PlaneFilm film{.title = "One drop, followed by filters of other q",
-                          .caption = "The truth should stay in the band, and fill it. Numbers: all drops.",
+                          .caption = "The error should stay in the band, and fill it. Numbers: all drops.",
                           .x = {"time", "s"},
                           .y = {"truth less estimate", "m"},
                           .slider = {"q, times the true one:"},

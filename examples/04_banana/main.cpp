@@ -11,7 +11,7 @@
 //   xx, yy  variances of x and of y [m^2]              E  mean over all drives     f   one drive
 // EQUATIONS  f:  x <- x + v cos(theta) dt,   y <- y + v sin(theta) dt
 //   extended    mean <- f(mean),  P <- F P F'       as if f were straight near the mean
-//   unscented   mean, P of a few points sent by f   as if the result were Gaussian
+//   unscented   mean, P of 9 points sent through f  as if the result were Gaussian
 //   particles   every one goes through f            as if there were enough of them
 //   exact       E y = exp(-s^2/2),   xx = (1 + 0.02^2) (1 - exp(-2 s^2)) / 2
 //               yy = (1 + 0.02^2) (1 + exp(-2 s^2)) / 2 - (E y)^2
@@ -70,7 +70,7 @@ int main(int argc, char** argv) {
        .steps = 2000,
        .least_steps = 500,
        .mistakes = {{"variance-for-sigma", "particles are drawn with s^2 for s; PythonRobotics #236",
-                     "The dashed ellipse is too small, up to 57 degrees."},
+                     "The dashed ellipse is too small: s^2 is less than s."},
                     {"uniform", "drawn evenly from -s to s; manif's demos",
                      "The dashed ellipse is too small: no particle is beyond one sigma."},
                     {"element-wise", "F * P * F' number by number; PythonRobotics until PR #258",
@@ -124,8 +124,8 @@ int main(int argc, char** argv) {
     const double y = std::exp(-s * s / 2), wave = std::exp(-2 * s * s), root = std::sqrt(lesson.steps());
     const double xx = 1.0004 * (1 - wave) / 2, yy = 1.0004 * (1 + wave) / 2 - y * y;
     const double off = 5 * std::sqrt(yy) / root, share = 7 / root;  // 5 sigma of mean, variance
-    lesson.verdict("extended, variance of x", extended.covariance(0, 0), s * s - 1e-9, s * s + 1e-9,
-                   "As wrong as a line is: s^2. Exact: " + readable(xx));
+    lesson.verdict("extended, variance of x, s^2", extended.covariance(0, 0), s * s - 1e-9, s * s + 1e-9,
+                   "A line's. Exact: " + readable(xx));
     lesson.verdict("unscented, error of y", unscented.mean(1) - y, -1e-4, 1e-4, "Exact: exp(-s^2 / 2)");
     lesson.verdict("unscented, variance of y", unscented.covariance(1, 1), 0.95 * yy, 1.05 * yy);
     lesson.verdict("particles, error of y", swarm.mean(1) - y, -off, off, "5 sigma of their mean");
@@ -134,7 +134,7 @@ int main(int argc, char** argv) {
   lesson.add(film);
   lesson.add(
       example::LinePlot{.title = "How many real drives end in the ellipse?",
-                        .caption = "Of a Gaussian 86.5 %. A banana is none: the red one loses the bend.",
+                        .caption = "86.5 % of a Gaussian, 88 to 90 of a banana. The red one loses the bend.",
                         .x = {"compass sigma", "degrees"},
                         .y = {"inside 2 sigma", "%"},
                         .x_values = column(shares, 0),

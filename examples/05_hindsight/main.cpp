@@ -11,7 +11,7 @@
 //   xs, Ps  the same, given all that was ever measured     C  gain: how much k takes of what k + 1 learnt
 // EQUATIONS (H. Rauch, F. Tung, C. Striebel, "Maximum likelihood estimates of linear dynamic systems", AIAA
 // Journal 3, 1965), from the last step, where both are the same, back to the first:
-//   C = P F' (P-)^-1,   xs(k) = x + C (xs(k+1) - x-),   Ps(k) = P + C (Ps(k+1) - P-) C' < P
+//   C = P F' (P-)^-1,   xs(k) = x + C (xs(k+1) - x-),   Ps(k) = P + C (Ps(k+1) - P-) C'
 // LOOK AT  the two ellipses in the film: the filter's swells in the tunnel (grey) and jumps at its end, the
 // smoother's is widest in the middle; its dashed way finds the tunnel's end, which the filter's misses.
 // CHANGE THIS (answers at the end of the file)
@@ -76,7 +76,7 @@ int main(int argc, char** argv) {
        .mistakes = {{"off-by-one", "F and Q of the step before; filterpy #37, until 0.1.3",
                      "It looks as it should, NEES too: only another smoother tells, by 11 m."},
                     {"wrong-sign", "Ps = P - C (Ps - P-), without C'; found in PyNumDiff PR #98",
-                     "Hindsight makes it less sure; in the tunnel variances are negative: none drawn."}}},
+                     "Hindsight makes it less sure; in the tunnel every second variance is negative."}}},
       argc, argv);
   cairn::Random random(lesson.seed());
   cairn::RunningMoments filter_nees, smoother_nees;
