@@ -122,8 +122,13 @@ inline std::optional<int> parse(CLI::App& app, const std::string& name, int argc
     app.parse(argc, argv);
     return std::nullopt;
   } catch (const CLI::ParseError& error) {
+    // A misspelt option is the mistake, not the file that was left out while looking up how to spell it.
+    const bool misspelt =
+        error.get_exit_code() == static_cast<int>(CLI::ExitCodes::RequiredError) && app.remaining_size() > 0;
     std::ostringstream asked_for;
-    if (app.exit(error, asked_for, std::cerr) != 0) return exit_mistake;
+    const int code = misspelt ? app.exit(CLI::ExtrasError(app.remaining()), asked_for, std::cerr)
+                              : app.exit(error, asked_for, std::cerr);
+    if (code != 0) return exit_mistake;
     std::cout << asked_for.str();
     return flush_standard_output(name) ? exit_well : exit_mistake;
   }

@@ -307,6 +307,9 @@ TEST_CASE("cairn_eval: what does not belong together is exit code 2 and words th
   says("truth.tum", "truth.tum", "--offset 1e-3 --covariances" + quoted(folder / "late.csv"),
        (folder / "late.csv").string() + ": no covariance to use: 200 poses have none of their time");
   CHECK(run("").code == 2);
+  const Outcome misspelt = run("--bogus");
+  CHECK(misspelt.code == 2);
+  CHECK(misspelt.says("--bogus"));
 }
 
 TEST_CASE("cairn_eval: the same files give the same bytes, and the page where there is one") {
