@@ -17,7 +17,7 @@
 // (R. E. Kalman, "A New Approach to Linear Filtering and Prediction Problems", 1960, for one state that
 // stays.) The recursive mean gives reading n the weight 1/n. The filter's gain is a ratio of doubts: doubt
 // about the belief over all doubt, so that whoever is surer counts more; p falls, since two readings know
-// more than one. A first guess is then just one more reading. Readings and results are A. Becker's,
+// more than one. A first guess is then like one poor reading. Readings and results are A. Becker's,
 // https://www.kalmanfilter.net/kalman1d.html: guess (60 +- 15) m; at the end 49.57 m, variance 2.47 m^2.
 //
 // LOOK AT  the blue funnel: it closes fast at first, then slowly. The black line should lie outside one time
@@ -52,7 +52,7 @@ int main(int argc, char** argv) {
        .least_steps = 100,
        .mistakes = {{"sigma-for-variance",
                      "deviation (5 m) in place of variance (25 m^2); paparazzi's hf_float.c (#3661)",
-                     "The height looks fine, its funnel is too narrow: errors of 2 own sigmas are usual."},
+                     "The height is 9 cm off, its funnel too narrow: errors of 2 own sigmas are usual."},
                     {"variance-stays",
                      "the variance never falls, nor does the gain; jjviscomi/kalman-filter until PR #2",
                      "It follows the last reading to the end, and its funnel never closes."}}},
@@ -124,7 +124,7 @@ int main(int argc, char** argv) {
   lesson.add(example::LinePlot{
       .title = "Gain",
       .caption = "The share of the surprise taken over: 1/n by the mean, a little less by the filter, for "
-                 "which the guess counts as 25/225 of a reading.",
+                 "which the guess, of 15 m, is 5^2/15^2 of a reading.",
       .x = {"readings"},
       .y = {"gain"},
       .x_values = column(table, 0),

@@ -6,7 +6,7 @@
 // STORY  A robot drives around a block. It knows what it was told to do, not how its wheels slipped. Now and
 // then it sees one of three beacons, whose places it knows: how far it is, and in which direction.
 //
-//   T  pose: place and heading   [m, m, rad]     r, b  range and bearing of a beacon         [m, rad]
+//   T  pose believed             [m, m, rad]     r, b  range and bearing of a beacon         [m, rad]
 //   u  speed and turn rate       [m/s, rad/s]    d     a small step of T: ahead, left, turn  [m, m, rad]
 //   P  covariance of the d from estimate to truth: truth = T exp(d)     p  T^-1 beacon: as seen from T
 //   z  a sighting (r, b), R its noise;   h  the same, expected;   H  the Jacobian of h by d, 2 x 3
@@ -14,10 +14,10 @@
 //   noise
 // EQUATIONS of the extended filter, u dt = (speed dt, 0, turn rate dt) (J. Sola, J. Deray, D. Atchuthan, "A
 // micro Lie theory for state estimation in robotics", 2018)
-//   T <- T exp(u dt),        P <- G P G' + Q,   G = Ad(exp(-u dt)): minus, since the new pose looks back
+//   T <- T exp(u dt),        P <- G P G' + Q,   G = Ad(exp(-u dt)): minus, as the old pose lies at -u dt
 //   T <- T exp(K (z - h)),   P <- (1 - K H) P,  K = P H' (H P H' + R)^-1
 //   h = (|p|, atan2(p_y, p_x));   z - h of bearings is the short way round: 2 from 179 to -179 degrees
-// LOOK AT  the film at 1.5 s, and by arrow keys to 3 s: the ellipse grows sideways, as a wrong heading
+// LOOK AT  the film at 1.5 s, by arrow keys to 3.5 s: the ellipse grows sideways, as a wrong heading
 // becomes a wrong place; then a beacon shrinks it. Last plot: plain z - h (black, in the corners).
 // CHANGE THIS (answers at the end of the file)
 //   1. Change step % 4 == 3 into step % 20 == 3: seldom a beacon. NEES? And with Unscented as `filter`?

@@ -125,16 +125,16 @@ int main(int argc, char** argv) {
     const double xx = 1.0004 * (1 - wave) / 2, yy = 1.0004 * (1 + wave) / 2 - y * y;
     const double off = 5 * std::sqrt(yy) / root, share = 7 / root;  // 5 sigma of mean, variance
     lesson.verdict("extended, variance of x, s^2", extended.covariance(0, 0), s * s - 1e-9, s * s + 1e-9,
-                   "A line's. Exact: " + readable(xx));
-    lesson.verdict("unscented, error of y", unscented.mean(1) - y, -1e-4, 1e-4, "Exact: exp(-s^2 / 2)");
+                   "Too wide: exact " + readable(xx));
+    lesson.verdict("unscented, error of y", unscented.mean(1) - y, -1e-4, 1e-4, "y less exp(-s^2 / 2)");
     lesson.verdict("unscented, variance of y", unscented.covariance(1, 1), 0.95 * yy, 1.05 * yy);
-    lesson.verdict("particles, error of y", swarm.mean(1) - y, -off, off, "5 sigma of their mean");
+    lesson.verdict("particles, error of y", swarm.mean(1) - y, -off, off, "5 sigma of a mean");
     lesson.verdict("particles, variance of x", swarm.covariance(0, 0), xx * (1 - share), xx * (1 + share));
   }
   lesson.add(film);
   lesson.add(
       example::LinePlot{.title = "How many real drives end in the ellipse?",
-                        .caption = "86.5 % of a Gaussian, 88 to 90 of a banana. The red one loses the bend.",
+                        .caption = "86.5 % of a Gaussian, 87 to 90 of a banana. The red one loses the bend.",
                         .x = {"compass sigma", "degrees"},
                         .y = {"inside 2 sigma", "%"},
                         .x_values = column(shares, 0),

@@ -3,7 +3,7 @@
 //
 // 05 Hindsight: the future informs the past.
 //
-// STORY  A cyclist's receiver gives a position every second or so, 3 m off or so, but for ten in a tunnel. At
+// STORY  A cyclist's receiver gives a position every second or so, 3 m off or so, but 10 s in a tunnel. At
 // the time one could only guess that the ride went straight on. In the evening one knows where it came out.
 //
 //   x, P    position and velocity, east and north [m, m/s], and their covariance, at step k by the filter
@@ -74,7 +74,7 @@ int main(int argc, char** argv) {
        .steps = 200,
        .least_steps = 50,
        .mistakes = {{"off-by-one", "F and Q of the step before; filterpy #37, until 0.1.3",
-                     "It looks as it should, NEES too: only another smoother tells, by 11 m."},
+                     "It looks right, NEES too: only another smoother tells."},
                     {"wrong-sign", "Ps = P - C (Ps - P-), without C'; found in PyNumDiff PR #98",
                      "Hindsight makes it less sure; in the tunnel every second variance is negative."}}},
       argc, argv);
@@ -126,7 +126,7 @@ int main(int argc, char** argv) {
   const auto band = cairn::chi_square_mean_band(4, static_cast<double>(lesson.steps()), 0.99999);
   lesson.verdict("NEES of the filter", filter_nees.mean(), band, "At the end of the tunnel");
   lesson.verdict("NEES of the smoother", smoother_nees.mean(), band, "In the middle of the tunnel");
-  lesson.verdict("from the library's smoother", apart, 0, 1e-9, "Largest difference of means");
+  lesson.verdict("less cairn's smoother", apart, 0, 1e-9, "Largest difference of means");
   lesson.verdict("smoother's variance / filter's", wider, 0, 1 + 1e-9, "Largest: more data cannot hurt");
   const auto &a = rows[in], &b = rows[out + 1];
   film.still = {{"truth", Ink::truth, column(rows, 1), column(rows, 2)},

@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: MIT
 #include "outputs.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <string>
 
 #include <nlohmann/json.hpp>
 
@@ -67,24 +69,38 @@ std::string summary(const Results& r) {
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
+/// A number down to the second digit of its standard deviation, and that.
+std::array<std::string, 2> with_sigma(double value, double sigma) {
+  int digits = 6;
+  if (sigma > 0 && std::abs(value) > 0)
+    digits = static_cast<int>(std::floor(std::log10(std::abs(value))) - std::floor(std::log10(sigma))) + 2;
+  return {readable(value, std::max(digits, 1)), readable(sigma, 2)};
+}
+
 example::Table number_table(const BoardCalibration& c) {
   example::Table table{.title = "The rig",
                        .caption = "Estimates with their standard deviations. Pixels, radians, metres.",
                        .columns = {"number", "left", "sigma", "right", "sigma"},
                        .rows = {}};
   const auto left = parameters_of(c.rig.rig.left), right = parameters_of(c.rig.rig.right);
-  for (std::size_t i = 0; i < names.size(); ++i)
-    table.rows.push_back({names[i], readable(left[i], 6), readable(sigma_of(c.rig.left, i), 2),
-                          readable(right[i], 6), readable(sigma_of(c.rig.right, i), 2)});
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const auto [of_left, its_sigma] = with_sigma(left[i], sigma_of(c.rig.left, i));
+    const auto [of_right, other_sigma] = with_sigma(right[i], sigma_of(c.rig.right, i));
+    table.rows.push_back({names[i], of_left, its_sigma, of_right, other_sigma});
+  }
+  const auto add = [&](const std::string& name, double value, double sigma) {
+    const auto [number, deviation] = with_sigma(value, sigma);
+    table.rows.push_back({name, "", "", number, deviation});
+  };
   const cairn::Vector<3> place = c.rig.rig.T_left_right.translation(),
                          turn = c.rig.rig.T_left_right.rotation().log();
-  const std::array<const char*, 3> axes{"x", "y", "z"};
+  const std::array<std::string, 3> axes{"x", "y", "z"};
   for (int i = 0; i < 3; ++i)
-    table.rows.push_back({std::string("right camera, ") + axes[static_cast<std::size_t>(i)] + " [m]", "", "",
-                          readable(place(i), 5), readable((*c.rig.translation_sigma)(i), 2)});
+    add("right camera, " + axes[static_cast<std::size_t>(i)] + " [m]", place(i),
+        (*c.rig.translation_sigma)(i));
   for (int i = 0; i < 3; ++i)
-    table.rows.push_back({std::string("turned about ") + axes[static_cast<std::size_t>(i)] + " [deg]", "", "",
-                          readable(turn(i) * degrees, 4), readable((*c.rig.rotation_sigma)(i)*degrees, 2)});
+    add("turned about " + axes[static_cast<std::size_t>(i)] + " [deg]", turn(i) * degrees,
+        (*c.rig.rotation_sigma)(i)*degrees);
   return table;
 }
 

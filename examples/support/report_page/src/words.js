@@ -4,7 +4,7 @@ import { element } from './dom.js';
 const words = [
   ['ATE', /\bATE\b/, 'absolute trajectory error: how far the estimated positions are from the true ones after the alignment that is named'],
   ['Cramer-Rao bound', /Cram[eé]r-Rao/, 'the smallest error that any unbiased estimate can have on average'],
-  ['dead reckoning', /dead reckoning/i, 'adding up what the motion is known of, with nothing seen'],
+  ['dead reckoning', /dead reckoning/i, 'adding up the motion that was commanded or measured, with nothing of the world seen'],
   ['extended filter', /\bextended\b/i, 'takes motion and sensor as straight lines, or planes, near its estimate'],
   ['inliers', /\binliers?\b/i, 'points that lie where the estimated pose says, within their noise; the rest counts as wrongly matched'],
   ['Jacobian', /\bJacobians?\b/, 'the matrix of derivatives: each number that comes out by each that goes in'],
