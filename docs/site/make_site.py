@@ -65,6 +65,7 @@ def tidied(site):
         text = re.sub(r"<script\b.*?</script>\s*", "", text, flags=re.DOTALL)
         text = re.sub(r' on(click|mouse\w+|key\w+|focus|blur)="[^"]*"', "", text)
         text = re.sub(r'<div class="levels">.*?</div>', "", text, flags=re.DOTALL)
+        text = text.replace(' style="display:none;"', "")  # rows of lists that a script would have unfolded
         text = re.sub(r'<a href="javascript:[^"]*"[^>]*>(.*?)</a>', r"\1", text, flags=re.DOTALL)
         text = re.sub(r'<div class="headertitle">\s*<div class="title">(.*?)</div>\s*</div>',
                       r'<div class="headertitle"><h1 class="title">\1</h1></div>', text, flags=re.DOTALL)
@@ -436,6 +437,13 @@ PHONE = """<!doctype html>
 """
 
 
+def hidden_faults(site):
+    """One for each page that keeps something from its reader, as lists do that a script is to unfold."""
+    for path in sorted(site.glob("*.html")):
+        if re.search(r'style="[^"]*display: *none', path.read_text(encoding="utf-8")):
+            yield f"{path.name} hides a part of itself"
+
+
 def phone_faults(site):
     """One for each page that a phone would have to scroll sideways; those of lessons are looked at by tests/course."""
     browser = chromium()
@@ -486,7 +494,7 @@ def main():
         on_a_phone = browsing.submit(phone_faults, site)
         if pictures is not None and not pictures.result():
             faults.append("there is no picture of the lessons")
-        faults += [*readme_faults(), *link_faults(site), *on_a_phone.result()]
+        faults += [*readme_faults(), *hidden_faults(site), *link_faults(site), *on_a_phone.result()]
     for fault in faults:
         print(f"docs: {fault}", file=sys.stderr)
     sys.exit(1 if faults else 0)
