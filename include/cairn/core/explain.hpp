@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: MIT
 //
 /// @file
-/// What has a sentence prints as it: `std::cout << filter.predict(belief, model, dt) << '\n'`.
+/// What has a sentence prints as it: `std::cout << filter.predict(belief, model, dt)`.
 #pragma once
 
 #include <concepts>
