@@ -71,7 +71,12 @@ TEST_SUITE("processor") {
     std::string line;
     while (std::getline(file, line) && !line.starts_with("flags")) {
     }
-    if (!line.starts_with("flags")) {
+#if defined(__x86_64__) || defined(__i386__)
+    const bool says = line.starts_with("flags");
+#else
+    const bool says = false;  // or of the machine that emulates this one
+#endif
+    if (!says) {
       MESSAGE("skipped: no /proc/cpuinfo with flags");
       return;
     }

@@ -87,10 +87,11 @@ template <class Index>
   const auto points = detail::read_points<Scalar, Index::fixed_dimension>(in, name);
   std::size_t live = 0;
   for (std::size_t id = 0; id < states.size(); ++id) {
-    if (states[id] < 0 || states[id] > 2)
-      raise(name + ": id " + std::to_string(id) + " has the state " + std::to_string(states[id]) +
+    const auto state = static_cast<unsigned char>(states[id]);  // a char may be signed, or not (ARM)
+    if (state > 2)
+      raise(name + ": id " + std::to_string(id) + " has the state " + std::to_string(state) +
             ", expected 0, 1 or 2");
-    live += states[id] == 1;
+    live += state == 1;
   }
   for (const PointId id : points.ids)
     if (id >= states.size() || states[id] != 1)
