@@ -17,11 +17,11 @@
 #include <functional>
 #include <mutex>
 #include <optional>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/parallel.hpp>
 
 namespace example {
 
@@ -45,7 +45,7 @@ public:
       ended_ = true;
     }
     changed_.notify_all();
-  }  // ~jthread waits
+  }  // ~JoiningThread waits
   Ahead(const Ahead&) = delete;
   Ahead& operator=(const Ahead&) = delete;
 
@@ -113,7 +113,7 @@ private:
   std::size_t begun_ = 0;    // items that are made or under way
   std::size_t taken_ = 0;
   bool ended_ = false;
-  std::vector<std::jthread> makers_;  // the last member: they are over before the rest goes
+  std::vector<cairn::JoiningThread> makers_;  // the last member: they are over before the rest goes
 };
 
 }  // namespace example

@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include <cairn/core/check.hpp>
+#include <cairn/io/text.hpp>
 
 #include "report_template.hpp"
 
@@ -48,9 +49,7 @@ Json rounded(double value) {
   if (!std::isfinite(value)) return nullptr;
   char text[32];
   const auto printed = std::to_chars(text, text + sizeof text, value, std::chars_format::general, 6);
-  double result = 0;
-  std::from_chars(text, printed.ptr, result);
-  return result;
+  return *cairn::parse_number(std::string_view(text, printed.ptr));
 }
 
 template <class Values>

@@ -18,7 +18,12 @@
 
 namespace cairn_test {
 
+#if defined(__SIZEOF_FLOAT128__)
 using Quad = __float128;
+#else
+using Quad = long double;
+static_assert(std::numeric_limits<Quad>::digits == 113);  // aarch64
+#endif
 
 inline double plain(Quad x) {
   return static_cast<double>(x);

@@ -16,6 +16,8 @@
 #include <cairn/filter/unscented.hpp>
 #include <cairn/models/linear.hpp>
 
+#include "filter/exact_filter.hpp"
+
 namespace ill_conditioned_test {
 namespace {
 
@@ -23,7 +25,7 @@ using cairn::Form;
 using cairn::Gaussian;
 using cairn::Matrix;
 using cairn::Vector;
-using Quad = __float128;
+using cairn_test::Quad;
 
 // The exact posterior covariance of the numbers as they were rounded, by information in 113 bits.
 template <int N, int M, class S>

@@ -9,16 +9,33 @@
 #pragma once
 
 #include <algorithm>
+#include <concepts>
 #include <cstddef>
 #include <exception>
 #include <memory>
 #include <thread>
 #include <type_traits>
+#include <utility>
 #include <vector>
 
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
+
+/// A thread that is waited for where it goes out of scope: std::jthread, which libc++ has from version 20 on.
+class JoiningThread {
+public:
+  template <std::invocable Work>
+  explicit JoiningThread(Work work) : thread_(std::move(work)) {}
+  JoiningThread(JoiningThread&&) noexcept = default;
+  JoiningThread& operator=(JoiningThread&&) = delete;
+  ~JoiningThread() {
+    if (thread_.joinable()) thread_.join();
+  }
+
+private:
+  std::thread thread_;
+};
 
 namespace detail {
 
@@ -41,9 +58,9 @@ inline void run_blocks(std::size_t count, std::size_t blocks,
 #endif
   };
   {
-    std::vector<std::jthread> workers;
+    std::vector<JoiningThread> workers;
     workers.reserve(blocks - 1);
-    for (std::size_t block = 1; block < blocks; ++block) workers.emplace_back(run, block);
+    for (std::size_t block = 1; block < blocks; ++block) workers.emplace_back([&run, block] { run(block); });
     run(0);
   }
   for (const std::exception_ptr& failure : failures)

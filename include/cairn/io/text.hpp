@@ -20,6 +20,7 @@
 #include <system_error>
 
 #include <cairn/core/check.hpp>
+#include <cairn/io/detail/read_number.hpp>
 #include <cairn/io/file.hpp>
 #include <cairn/version.hpp>
 
@@ -39,7 +40,7 @@ template <class Number = double>
 [[nodiscard]] std::optional<Number> parse_number(std::string_view text) noexcept {
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
   Number value{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const auto [end, error] = detail::read_number(text.data(), text.data() + text.size(), value);
   if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
   return value;
 }
