@@ -5,11 +5,11 @@
 #include <cstdint>
 #include <map>
 #include <set>
-#include <thread>
 #include <vector>
 
 #include <doctest/doctest.h>
 
+#include <cairn/core/parallel.hpp>
 #include <cairn/grid/shared_tiles.hpp>
 
 #include "support/folder.hpp"
@@ -156,7 +156,7 @@ TEST_SUITE("grid/shared_tiles") {
     for (int i = 0; i < 64; ++i) base.write({i * tile_side, 0}) = 1;
     std::vector<SharedTiles<int>> copies(4, base);
     {
-      std::vector<std::jthread> threads;
+      std::vector<cairn::JoiningThread> threads;
       for (int t = 0; t < 4; ++t)
         threads.emplace_back([&copies, t] {
           for (int i = 0; i < 64; ++i) copies[static_cast<std::size_t>(t)].write({i * tile_side, 0}) += t;

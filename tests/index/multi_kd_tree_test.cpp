@@ -13,12 +13,12 @@
 #include <numeric>
 #include <span>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
 #include <doctest/doctest.h>
 
+#include <cairn/core/parallel.hpp>
 #include <cairn/index/best_bin_first.hpp>
 #include <cairn/index/box_query.hpp>
 #include <cairn/index/multi_kd_tree.hpp>
@@ -352,11 +352,11 @@ TEST_SUITE("multi_kd_tree") {
       std::size_t wrong = 0;
       {
         reads_during_a_merge += index.merges_under_way();
-        const std::jthread beside([&] { wrong += ask(index) != expected; });
+        const cairn::JoiningThread beside([&] { wrong += ask(index) != expected; });
         ask(index);
       }
       {
-        const std::jthread reader([&] { wrong += ask(copy) != expected; });
+        const cairn::JoiningThread reader([&] { wrong += ask(copy) != expected; });
         for (cairn::PointId id = 0; id < 50; ++id) index.erase(static_cast<cairn::PointId>(begin) + 3 * id);
         index.insert(random_points(10, random));
       }
