@@ -235,10 +235,12 @@ struct DotView {
   }
 };
 
-/// What one or two dots say of a pose that they do not determine.
+/// What one or two dots say of a pose that they do not determine. After seconds without a dot the attitude is
+/// known to some tenths of a radian, and a dot to a pixel: one linearisation at the prediction would be far
+/// off.
 void correct(cairn::Gaussian<SE3>& camera, cairn::KeyframeMap& map,
              const std::vector<cairn::StereoSighting>& seen) {
-  const cairn::Extended filter{.gate = cairn::chi_square_quantile(0.9999, 4)};
+  const cairn::Extended filter{.gate = cairn::chi_square_quantile(0.9999, 4), .iterations = 20};
   for (const cairn::StereoSighting& s : seen) {
     const auto dot = map.landmark_in_world(s.landmark);
     if (!dot) continue;
