@@ -102,6 +102,32 @@ TEST_SUITE("descriptor_index") {
         }
   }
 
+  TEST_CASE("many neighbours: until so many are found there is no limit, and by codes nobody is left out") {
+    cairn::Random random(cairn_test::seed(78));
+    const std::size_t count = 3000, dim = 40;
+    const auto numbers = cairn_test::make_points<float>("uniform", count, dim, random);
+    const Points points(numbers, dim);
+    const auto query = cairn_test::make_points<float>("uniform", 1, dim, random);
+    Index::Search search;
+    for (const std::size_t in_cell : {2U, 100U, 3000U}) {
+      CAPTURE(in_cell);
+      const Index index(points, {.points_in_cell = in_cell, .codes = cairn::DescriptorCodes::on});
+      for (const std::size_t k : {30U, 300U, 2900U})
+        for (const std::size_t leaves : {1U, 30U, 130U, 100000U}) {
+          CAPTURE(k);
+          CAPTURE(leaves);
+          CHECK(wrong_answers(index, points, query, k, leaves, search) == 0);
+        }
+      std::vector<cairn::Neighbor<float>> found(2000);
+      cairn::KNearest<float> collector(found.data(), found.size());
+      cairn::Work work;
+      search.search(index, query, collector, {.leaves = 100}, &work);
+      // Of blocks looked at while there is no limit nobody is left out; their last places may be empty.
+      if (in_cell == 3000) CHECK(collector.size() == 100 * 16);
+      CHECK(collector.size() >= work.leaves);
+    }
+  }
+
   TEST_CASE("codes spare bytes and lose few: the same budget finds nearly as much") {
     cairn::Random random(cairn_test::seed(79));
     std::vector<float> numbers(20000 * 96);

@@ -234,9 +234,10 @@ public:
       const auto missed = index.scale_.encode(row_.data(), bytes_.data());
       const Exact exact{index, row_.data()};
       byte_doubts_.clear();
+      byte_asked_.clear();
       detail::ByteOffer offer({index.dimension(), index.scale_.unit(), missed.rounding, index.error_,
                                index.inside_ ? missed.outside_squared : 0},
-                              exact, collector, byte_doubts_);
+                              exact, collector, byte_doubts_, byte_asked_);
       Work done;
       const bool all = cells_.search(index.cells_, bytes_, budget.leaves, offer, done);
       if (work != nullptr) *work += done;
@@ -250,7 +251,7 @@ public:
   private:
     std::vector<float> row_;
     std::vector<std::uint8_t> bytes_;
-    std::vector<detail::ByteDoubt> byte_doubts_;
+    std::vector<detail::ByteDoubt> byte_doubts_, byte_asked_;
     detail::CellSearch cells_;
   };
 
@@ -359,6 +360,7 @@ private:
       const auto* first = (*points_)[id].data();
       const std::size_t in_line = std::max<std::size_t>(1, 64 / sizeof(*first));
       for (std::size_t axis = 0; axis < dimension(); axis += in_line) __builtin_prefetch(first + axis);
+      __builtin_prefetch(first + dimension() - 1);  // rows need not begin on a line
     }
   }
 

@@ -44,10 +44,12 @@ template <class Exact, class C>
 class ByteOffer {
 public:
   /// `doubts` is empty, and used until settle().
-  ByteOffer(const ByteAccuracy& accuracy, const Exact& exact, C& collector, std::vector<ByteDoubt>& doubts)
+  ByteOffer(const ByteAccuracy& accuracy, const Exact& exact, C& collector, std::vector<ByteDoubt>& doubts,
+            std::vector<ByteDoubt>& asked)
       : exact_(exact),
         collector_(collector),
         doubts_(doubts),
+        asked_(asked),
         unit_(accuracy.unit),
         slack_(accuracy.query_error + accuracy.point_error),
         likely_slack_(std::min(slack_, likely_slack(accuracy))),
@@ -68,6 +70,25 @@ public:
 
   void one(std::int32_t distance, PointId id) {
     if (distance < below_ && id != no_point) point(distance, id);
+  }
+
+  /// As one(), but where the coordinates are needed they are asked for, and the point is offered by asked():
+  /// they have come meanwhile.
+  void ask(std::int32_t distance, PointId id) {
+    if (slack_ == 0) return one(distance, id);
+    if (distance >= below_ || id == no_point) return;
+    exact_.prefetch(id);
+    asked_.push_back({distance, id});
+  }
+  /// Offers those who were asked for, nearest by their bytes first: the limit is soon below the others.
+  /// Returns whether there was anybody.
+  bool asked() {
+    if (asked_.empty()) return false;
+    std::sort(asked_.begin(), asked_.end(),
+              [](const ByteDoubt& a, const ByteDoubt& b) { return a.distance < b.distance; });
+    for (const ByteDoubt& point : asked_) one(point.distance, point.id);
+    asked_.clear();
+    return true;
   }
 
   /// Asks for the coordinates of a point that one() may measure.
@@ -152,6 +173,7 @@ private:
   const Exact& exact_;
   C& collector_;
   std::vector<ByteDoubt>& doubts_;
+  std::vector<ByteDoubt>& asked_;
   float unit_;
   float slack_;            ///< how far the bytes of query and point together may be from them, in bytes
   float likely_slack_;     ///< and how far they are as a rule, at most

@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -41,14 +42,12 @@ public:
     means.distances(0, means.blocks(), query_, order_.keys());
     order_.reset();
     done.nodes += means.blocks();
-    pending_.clear();
-    doubts_.clear();
     looked_at_ = 0;
-    if (cells.coded()) cells.points().codebook().make_tables(query.data(), tables_);
+    if (cells.coded()) prepare_codes(cells, query);
     const bool all = scan_cells(cells, blocks, offer, done);
-    measure_pending(cells, offer);
+    if (cells.coded()) finish_codes(cells, offer);
     if (all) {
-      settle_doubts(cells, offer);
+      if (cells.coded()) settle_doubts(cells, offer);
       offer.settle();
     }
     return all;
@@ -58,6 +57,22 @@ public:
   [[nodiscard]] std::size_t looked_at() const noexcept { return looked_at_; }
 
 private:
+  void prepare_codes(const ByteCells& cells, const std::vector<std::uint8_t>& query) {
+    cells.points().codebook().make_tables(query.data(), tables_);
+    pending_.clear();
+    doubts_.clear();
+    parts_.clear();
+    estimates_.resize(most_estimated * block_size);
+    estimated_ = 0;
+    few_ = first_few;
+    lowest_ = std::numeric_limits<float>::infinity();
+  }
+  template <class Offer>
+  void finish_codes(const ByteCells& cells, Offer& offer) {
+    decide(cells, offer);
+    measure_all(cells, offer);
+  }
+
   template <class Offer>
   bool scan_cells(const ByteCells& cells, std::size_t left, Offer& offer, Work& done) {
     auto cell = order_.next();
@@ -69,10 +84,12 @@ private:
         const std::size_t begin = cells.first_block(cell.place);
         const std::size_t blocks = cells.blocks_of(cell.place);
         const std::size_t scanned = std::min(left, blocks);
-        if (cells.coded())
+        if (cells.coded()) {
           scan_codes(cells, cell, scanned, offer);
-        else
+          if (offer.unlimited() && may_end_before(cells, after)) decide(cells, offer);
+        } else {
           scan(cells, begin, scanned, offer);
+        }
         done.leaves += scanned;
         done.distances += scanned * block_size;
         left -= scanned;
@@ -90,14 +107,23 @@ private:
       const std::size_t now = std::min(at_once, end - block);
       const PointId* ids = cells.ids_of(block);
       cells.points().members().distances(block, now, query_, distances);
-      if (offer.unlimited()) {
-        for (std::size_t i = 0; i < now * block_size; ++i)
-          if (ids[i] == no_point) distances[i] = std::numeric_limits<std::int32_t>::max();
-        find_limit(distances, now, offer,
-                   [&](std::size_t i, std::int32_t nearest) { offer.one(nearest, ids[i]); });
-      }
+      if (offer.unlimited()) find_limit(distances, ids, now, offer);
       offer.blocks(distances, ids, now);
       block += now;
+    }
+  }
+
+  /// Without a limit all would be offered: the nearest ones, taken one by one, give one. Whoever is taken, or
+  /// not there, has the largest number.
+  template <class Offer>
+  static void find_limit(std::int32_t* distances, const PointId* ids, std::size_t count, Offer& offer) {
+    constexpr std::int32_t done = std::numeric_limits<std::int32_t>::max();
+    for (std::size_t i = 0; i < count * block_size; ++i)
+      if (ids[i] == no_point) distances[i] = done;
+    while (offer.unlimited()) {
+      std::int32_t* const least = std::min_element(distances, distances + count * block_size);
+      if (*least == done) return;
+      offer.one(std::exchange(*least, done), ids[least - distances]);
     }
   }
 
@@ -110,48 +136,100 @@ private:
     }
   }
 
-  /// Asks for the bytes of likely points, and looks at those of the blocks before: they have come
-  /// meanwhile. Points that are possible but not likely are written down.
+  /// Estimates, and meanwhile whoever was asked for at the last call comes and is measured. Without a limit
+  /// everyone would be likely: then estimates are kept, and decided on once a few of the nearest, which are
+  /// asked for, have given one.
   template <class Offer>
   void scan_codes(const ByteCells& cells, SmallestFirst::Item cell, std::size_t count, Offer& offer) {
-    const std::size_t points = cells.members_of(cell.place).size();
     std::size_t block = cells.first_block(cell.place);
-    const std::size_t end_of_points = block * block_size + points;
-    float estimates[at_once * block_size];
-    CodeVerdict verdicts[at_once];
+    const std::size_t end_of_points = block * block_size + cells.members_of(cell.place).size();
     for (const std::size_t end = block + count; block < end;) {
-      const std::size_t now = std::min(at_once, end - block);
+      if (estimated_ == most_estimated) decide(cells, offer);
+      const std::size_t now = std::min(most_estimated - estimated_, end - block);
+      float* const estimates = estimates_.data() + estimated_ * block_size;
       cells.points().codes().estimates(block, now, tables_, scale_of(cells, cell.key), estimates);
       for (std::size_t place = end_of_points; place < (block + now) * block_size; ++place)
         estimates[place - block * block_size] = std::numeric_limits<float>::infinity();
-      measure_pending(cells, offer);
-      if (offer.unlimited())
-        find_limit(estimates, now, offer, [&](std::size_t i, float) {
-          pending_.push_back(static_cast<std::uint32_t>(block * block_size + i));
-          measure_pending(cells, offer);
-        });
-      cells.points().codes().verdicts(block, now, estimates, limits_of(cells, cell.key, offer), verdicts);
-      for (std::size_t i = 0; i < now; ++i, ++block) {
-        ask_for(cells, block, verdicts[i].likely);
-        if (const unsigned doubtful = verdicts[i].possible & ~verdicts[i].likely)
-          doubts_.push_back({static_cast<std::uint32_t>(block), doubtful, cell.key});
-      }
+      parts_.push_back({static_cast<std::uint32_t>(block), static_cast<std::uint32_t>(now), cell.key});
+      estimated_ += now;
+      block += now;
+      const bool waited = measure_pending(cells, offer);
+      if (!offer.unlimited())
+        decide(cells, offer);
+      else if (!waited)
+        ask_for_nearest(cells);
     }
   }
 
-  /// Without a limit everyone is likely: those with the smallest numbers give one, taken one by one. Whoever
-  /// is taken, or not there, has the largest number.
-  template <class Number, class Offer, class Take>
-  static void find_limit(Number* numbers, std::size_t count, const Offer& offer, const Take& take) {
-    constexpr Number done = std::numeric_limits<Number>::has_infinity
-                                ? std::numeric_limits<Number>::infinity()
-                                : std::numeric_limits<Number>::max();
-    while (offer.unlimited()) {
-      Number* const least = std::min_element(numbers, numbers + count * block_size);
-      if (*least == done) return;
-      const Number number = std::exchange(*least, done);
-      take(static_cast<std::size_t>(least - numbers), number);
+  /// Whether somebody has an estimate so small that perhaps nothing in a cell, the nearest one left, is
+  /// nearer: then it is better to wait for a limit than to go on meanwhile.
+  [[nodiscard]] bool may_end_before(const ByteCells& cells, SmallestFirst::Item cell) const noexcept {
+    if (cell.place == SmallestFirst::none) return false;
+    const auto key = static_cast<float>(cell.key);
+    const float gap = std::sqrt(key) - cells.radius(cell.place);
+    return gap >= 0 && lowest_ - cells.points().codes().rounding(key, tables_) <= gap * gap;
+  }
+
+  /// Asks for the bytes of the likely points of all estimates that are kept. Those that are possible but not
+  /// likely are written down.
+  template <class Offer>
+  void decide(const ByteCells& cells, Offer& offer) {
+    while (offer.unlimited())
+      if (!measure_pending(cells, offer) && !ask_for_nearest(cells)) break;
+    const float* estimates = estimates_.data();
+    CodeVerdict verdicts[most_estimated];
+    for (const Part& part : parts_) {
+      cells.points().codes().verdicts(part.block, part.count, estimates, limits_of(cells, part.key, offer),
+                                      verdicts);
+      for (std::uint32_t i = 0; i < part.count; ++i) {
+        ask_for(cells, part.block + i, verdicts[i].likely);
+        if (const unsigned doubtful = verdicts[i].possible & ~verdicts[i].likely)
+          doubts_.push_back({part.block + i, doubtful, part.key});
+      }
+      estimates += part.count * block_size;
     }
+    parts_.clear();
+    estimated_ = 0;
+  }
+
+  /// Asks for the bytes of a few points with the smallest estimates, twice as many each time. Whoever is
+  /// taken, or not there, has an infinite estimate. Returns whether any was.
+  bool ask_for_nearest(const ByteCells& cells) {
+    constexpr float taken = std::numeric_limits<float>::infinity();
+    unsigned masks[most_estimated];
+    with_widest_lanes([&]() CAIRN_INLINED {
+      // Of sixteen parts, the lanes, each has its smallest: so many estimates at least do not exceed the
+      // one of that rank.
+      Block<float> low = Block<float>{} + taken;
+      for (std::size_t b = 0; b < estimated_; ++b) {
+        Block<float> here;
+        load_block<float>(estimates_.data() + b * block_size, here);
+        low = here < low ? here : low;
+      }
+      lowest_ = std::min(lowest_, smallest<float>(low));
+      float parts[block_size];
+      std::memcpy(parts, &low, sizeof(low));
+      Block<std::int32_t> below{};
+      for (std::size_t i = 0; i < block_size; ++i) below -= Block<float>{} + parts[i] < low;
+      const Block<float> ranked = below < Block<std::int32_t>{} + few_ ? -low : Block<float>{} + taken;
+      const float least = std::max(smallest<float>(ranked), -std::numeric_limits<float>::max());
+      for (std::size_t b = 0; b < estimated_; ++b) {
+        Block<float> here;
+        load_block<float>(estimates_.data() + b * block_size, here);
+        here = -here;
+        masks[b] = ~mask_below<float>(here, least) & 0xffffU;
+      }
+    });
+    few_ = std::min(2 * few_, static_cast<std::int32_t>(block_size));
+    const std::size_t before = pending_.size();
+    std::size_t b = 0;
+    for (const Part& part : parts_)
+      for (std::uint32_t i = 0; i < part.count; ++i, ++b) {
+        ask_for(cells, part.block + i, masks[b]);
+        for (unsigned mask = masks[b]; mask != 0; mask &= mask - 1)
+          estimates_[b * block_size + static_cast<std::size_t>(std::countr_zero(mask))] = taken;
+      }
+    return pending_.size() > before;
   }
 
   /// Measures whoever is still possible of those that were not likely.
@@ -166,7 +244,7 @@ private:
       if (pending_.size() >= at_once) measure_pending(cells, offer);
       ask_for(cells, doubt.block, verdict.possible & doubt.lanes);
     }
-    measure_pending(cells, offer);
+    measure_all(cells, offer);
   }
 
   [[nodiscard]] CodeScale scale_of(const ByteCells& cells, std::int32_t key) const noexcept {
@@ -189,18 +267,32 @@ private:
     }
   }
 
+  /// Offers whose coordinates were asked for at the last call, and measures the bytes of those that are
+  /// pending: the likely ones have their coordinates asked for. Returns whether there was anybody.
   template <class Offer>
-  void measure_pending(const ByteCells& cells, Offer& offer) {
-    if (pending_.empty()) return;
+  bool measure_pending(const ByteCells& cells, Offer& offer) {
+    const bool asked = offer.asked();
+    if (pending_.empty()) return asked;
     looked_at_ += pending_.size();
     distances_.resize(pending_.size());
     cells.points().rows().distances(pending_.data(), pending_.size(), query_, distances_.data());
     for (std::size_t i = 0; i < pending_.size(); ++i)
-      if (distances_[i] < offer.below()) offer.prefetch(cells.id_of(pending_[i]));
-    for (std::size_t i = 0; i < pending_.size(); ++i)
-      if (distances_[i] < offer.below()) offer.one(distances_[i], cells.id_of(pending_[i]));
+      if (distances_[i] < offer.below()) offer.ask(distances_[i], cells.id_of(pending_[i]));
     pending_.clear();
+    return true;
   }
+  template <class Offer>
+  void measure_all(const ByteCells& cells, Offer& offer) {
+    while (measure_pending(cells, offer)) {
+    }
+  }
+
+  /// Blocks of a cell whose points have estimates.
+  struct Part {
+    std::uint32_t block;
+    std::uint32_t count;
+    std::int32_t key;
+  };
 
   /// Points of a block that are possible but were not likely.
   struct Doubt {
@@ -209,7 +301,9 @@ private:
     std::int32_t key;  ///< squared distance from the cell's mean
   };
 
-  static constexpr std::size_t at_once = 8;  ///< blocks that are looked at together
+  static constexpr std::size_t at_once = 8;          ///< blocks that are looked at together
+  static constexpr std::size_t most_estimated = 64;  ///< blocks whose estimates are kept
+  static constexpr std::int32_t first_few = 5;       ///< points that are asked for without a limit
   /// How many spreads an estimate may err to the one side before a point that is near is taken for far: 3
   /// leave out one of a thousand.
   static constexpr float likely_spreads = 3;
@@ -217,6 +311,11 @@ private:
   ByteQuery query_;
   SmallestFirst order_;  ///< of the cells, by the distance of their means
   CodeTables tables_;
+  AlignedVector<float> estimates_;  ///< of the points of parts_
+  std::size_t estimated_ = 0;       ///< blocks
+  std::vector<Part> parts_;
+  std::int32_t few_ = first_few;        ///< to ask for next
+  float lowest_ = 0;                    ///< estimate without a limit
   std::vector<std::uint32_t> pending_;  ///< places
   std::vector<std::int32_t> distances_;
   std::vector<Doubt> doubts_;
