@@ -10,8 +10,7 @@
 //   u  speed and turn rate       [m/s, rad/s]    d     a small step of T: ahead, left, turn  [m, m, rad]
 //   P  covariance of the d from estimate to truth: truth = T exp(d)     p  T^-1 beacon: as seen from T
 //   z  a sighting (r, b), R its noise;   h  the same, expected;   H  the Jacobian of h by d, 2 x 3
-//   G  the Jacobian of a motion (F in 02): the old pose's d, as seen from the new one;   Q  the motion's
-//   noise
+//   G  the Jacobian of a motion (F in 02): the old pose's d, as seen from the new one;   Q  its noise
 // EQUATIONS of the extended filter, u dt = (speed dt, 0, turn rate dt) (J. Sola, J. Deray, D. Atchuthan, "A
 // micro Lie theory for state estimation in robotics", 2018)
 //   T <- T exp(u dt),        P <- G P G' + Q,   G = Ad(exp(-u dt)): minus, as the old pose lies at -u dt
