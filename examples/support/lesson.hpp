@@ -7,8 +7,7 @@
 ///
 ///   example::Lesson lesson({.name = "04_banana", .title = "...", .sentence = "...", .steps = 100,
 ///                           .least_steps = 10, .most_steps = 1000,
-///                           .mistakes = {{"wrap", "residual not wrapped: seen in ...", "It loses the way at
-///                           180 degrees."}}},
+///                           .mistakes = {{"wrap", "residual not wrapped: seen in", "Lost at 180."}}},
 ///                          argc, argv);
 ///   ...
 ///   lesson.verdict("NEES", nees.mean(), band.low, band.high, "3 where the filter knows how wrong it is");
