@@ -1,5 +1,6 @@
 // SPDX-FileCopyrightText: 2026 The cairn authors
 // SPDX-License-Identifier: MIT
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -11,6 +12,7 @@
 
 #include <cairn/index/best_bin_first.hpp>
 #include <cairn/index/brute_force.hpp>
+#include <cairn/index/detail/cell_queue.hpp>
 #include <cairn/index/kd_tree.hpp>
 #include <cairn/index/principal_axes.hpp>
 #include <cairn/index/ratio_test.hpp>
@@ -37,9 +39,49 @@ void turn(const cairn::PrincipalAxes& axes, std::vector<float>& rows) {
   rows.swap(turned);
 }
 
+struct Bound {
+  float bound;
+  int number;
+  bool operator==(const Bound&) const = default;
+};
+
 }  // namespace
 
 TEST_SUITE("best_bin_first") {
+  TEST_CASE("cell_queue: gives what a sorted list of everything would, and the nearest of what it left out") {
+    cairn::Random random(cairn_test::seed(11));
+    for (int round = 0; round < 2000; ++round) {
+      const std::size_t leaves = round % 25 == 0 ? 1000 : static_cast<std::size_t>(random.uniform(0, 12));
+      CAPTURE(leaves);
+      cairn::detail::CellQueue<Bound> queue;
+      queue.open(leaves);
+      std::vector<Bound> all;  // nearest first, equal ones as they came
+      int number = 0;
+      const auto add = [&](float bound) {
+        const Bound cell{bound, number++};
+        all.insert(std::upper_bound(all.begin(), all.end(), cell,
+                                    [](const Bound& a, const Bound& b) { return a.bound < b.bound; }),
+                   cell);
+        if (queue.takes(bound)) queue.push(cell);
+      };
+      for (int i = 0; i < 5; ++i) add(0);
+      for (std::size_t taken = 0; taken < std::min<std::size_t>(leaves, 40) && !all.empty(); ++taken) {
+        REQUIRE(!queue.empty());
+        const Bound cell = queue.pop();
+        if (leaves < 256)
+          REQUIRE(cell == all.front());
+        else
+          REQUIRE(cell.bound == all.front().bound);
+        all.erase(all.begin());
+        for (int i = 0; i < 4; ++i) add(cell.bound + std::floor(static_cast<float>(random.uniform(0, 6))));
+      }
+      if (leaves < 40) {
+        REQUIRE(queue.empty());
+        REQUIRE(queue.left_out() == all.front().bound);
+      }
+    }
+  }
+
   TEST_CASE("best_bin_first: without a budget it is exact, in one tree and in several at once") {
     const std::uint64_t seed = cairn_test::seed(21);
     CAPTURE(seed);
@@ -70,10 +112,11 @@ TEST_SUITE("best_bin_first") {
 
   TEST_CASE("best_bin_first: keeps to its budget of leaves and says whether the answer is exact") {
     cairn::Random random(cairn_test::seed(5));
-    const auto numbers = cairn_test::make_points<float>("uniform", 5000, 16, random);
+    const auto numbers = cairn_test::make_points<float>("uniform", 20000, 16, random);
     const Tree tree(cairn::Rows<float>(numbers, 16));
     cairn::BestBinFirst<Tree> search;
-    for (const std::size_t budget : {std::size_t{0}, std::size_t{1}, std::size_t{7}, tree.leaves()}) {
+    for (const std::size_t budget :
+         {std::size_t{0}, std::size_t{1}, std::size_t{7}, std::size_t{257}, tree.leaves()}) {
       const auto query = random_query(16, random);
       cairn::Nearest<float> nearest;
       cairn::Work work;

@@ -55,6 +55,32 @@ TEST_SUITE("principal_axes") {
     }
   }
 
+  TEST_CASE("principal_axes: turns every number of points of any dimension, and writes no further") {
+    cairn::Random random(cairn_test::seed(9));
+    for (const std::size_t dim : {1, 2, 15, 16, 17, 48, 63, 64, 65, 80, 127, 128, 130}) {
+      CAPTURE(dim);
+      std::vector<float> rows(3 * dim);
+      for (float& number : rows) number = static_cast<float>(random.normal());
+      const cairn::PrincipalAxes axes(cairn::Rows<float>(rows, dim));
+      std::vector<double> turned;
+      for (std::size_t i = 0; i < 3; ++i) {
+        std::vector<float> row(dim + 1, 77.0F);
+        axes.turn(&rows[i * dim], row.data());
+        CHECK(row[dim] == 77.0F);
+        turned.insert(turned.end(), row.begin(), row.end() - 1);
+      }
+      const auto product = [dim](const auto& of, std::size_t i, std::size_t j) {
+        double sum = 0;
+        for (std::size_t a = 0; a < dim; ++a) sum += double{of[i * dim + a]} * double{of[j * dim + a]};
+        return sum;
+      };
+      for (std::size_t i = 0; i < 3; ++i)
+        for (std::size_t j = 0; j < 3; ++j)
+          CHECK(product(turned, i, j) ==
+                doctest::Approx(product(rows, i, j)).epsilon(1e-5).scale(static_cast<double>(dim)));
+    }
+  }
+
   TEST_CASE("principal_axes: one point, equal points and bad points") {
     const std::vector<float> equal(40, 2.0F);
     const cairn::PrincipalAxes axes(cairn::Rows<float>(equal, 4));

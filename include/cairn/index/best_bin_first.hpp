@@ -20,6 +20,7 @@
 
 #include <cairn/core/check.hpp>
 #include <cairn/index/collectors.hpp>
+#include <cairn/index/detail/cell_queue.hpp>
 #include <cairn/index/detail/kd_layout.hpp>
 #include <cairn/index/detail/tree_access.hpp>
 #include <cairn/index/metric.hpp>
@@ -72,22 +73,21 @@ private:
   template <class QueryOf, class C>
   bool search_each(std::span<const Tree* const> trees, const QueryOf& query_of, C& collector, Budget budget,
                    Work* work) {
-    queue_.clear();
+    queue_.open(budget.leaves);
     turns_.clear();
     Work done;
-    std::size_t leaves = 0;
     for (std::size_t i = 0; i < trees.size(); ++i)
-      if (trees[i] != nullptr && !trees[i]->empty()) push({0, static_cast<std::uint32_t>(i), 0, 0, no_turn});
+      if (trees[i] != nullptr && !trees[i]->empty() && queue_.takes(0))
+        queue_.push({0, static_cast<std::uint32_t>(i), 0, 0, no_turn});
     Real rest = std::numeric_limits<Real>::infinity();  // how near an unvisited cell may be
     Leaf waiting;  // scanned only after the next one has been asked for, so that memory is not waited for
-    while (!queue_.empty()) {
-      const Cell cell = pop();
+    for (std::size_t leaves = 0; !queue_.empty(); ++leaves) {
+      const Cell cell = queue_.pop();
       if (!(cell.bound < static_cast<Real>(collector.limit()))) break;
       if (leaves == budget.leaves) {
         rest = cell.bound;
         break;
       }
-      ++leaves;
       const Real* const query = query_of(cell.tree);
       const Leaf next{trees[cell.tree], query, descend(*trees[cell.tree], cell, query, collector, done)};
       prefetch(next);
@@ -96,7 +96,7 @@ private:
     }
     if (waiting.tree != nullptr) scan(waiting, collector, done);
     if (work != nullptr) *work += done;
-    return !(rest < static_cast<Real>(collector.limit()));
+    return !(std::min(rest, queue_.left_out()) < static_cast<Real>(collector.limit()));
   }
 
   /// A subtree not yet visited: its lower bound (reduced), and the last turn away from the query above it.
@@ -126,21 +126,6 @@ private:
     std::uint32_t before;
   };
 
-  void push(const Cell& cell) {
-    queue_.push_back(cell);
-    std::push_heap(queue_.begin(), queue_.end(), Farther{});
-  }
-  Cell pop() {
-    std::pop_heap(queue_.begin(), queue_.end(), Farther{});
-    const Cell cell = queue_.back();
-    queue_.pop_back();
-    return cell;
-  }
-  /// A type: a function would be called by its pointer.
-  struct Farther {
-    bool operator()(const Cell& a, const Cell& b) const noexcept { return a.bound > b.bound; }
-  };
-
   /// From a cell down to the leaf on the query's side of every split, whose number is returned; the other
   /// sides are queued.
   template <class C>
@@ -156,9 +141,10 @@ private:
       const Real across =
           detail::offset_across(tree.metric(), query[split.axis], static_cast<Real>(split.value), split.axis);
       const Real bound = detail::moved_bound(tree.metric(), cell.bound, old, across, split.axis);
-      if (bound < static_cast<Real>(collector.limit())) {
+      if (bound < static_cast<Real>(collector.limit()) && queue_.takes(bound)) {
         turns_.push_back({across, split.axis, cell.turn});
-        push({bound, cell.tree, cell.depth + 1, near ^ 1U, static_cast<std::uint32_t>(turns_.size() - 1)});
+        queue_.push(
+            {bound, cell.tree, cell.depth + 1, near ^ 1U, static_cast<std::uint32_t>(turns_.size() - 1)});
       }
       cell.slot = near;
     }
@@ -185,7 +171,7 @@ private:
     return 0;
   }
 
-  std::vector<Cell> queue_;
+  detail::CellQueue<Cell> queue_;
   std::vector<Turn> turns_;
   std::vector<Real> row_;
   std::vector<Real> wrapped_;

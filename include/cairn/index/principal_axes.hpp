@@ -12,6 +12,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <cstring>
 #include <span>
 #include <vector>
 
@@ -62,13 +63,29 @@ private:
   template <class NumberAt>
   void turn_by(float* turned, const NumberAt& number_at) const noexcept {
     detail::with_widest_lanes([&]() CAIRN_INLINED {
-      for (std::size_t i = 0; i < dim_; ++i) turned[i] = 0;
-      for (std::size_t a = 0; a < dim_; ++a) {
-        const float number = number_at(a);
-        const float* column = columns_.data() + a * dim_;
-        for (std::size_t i = 0; i < dim_; ++i) turned[i] += number * column[i];
-      }
+      constexpr std::size_t tile = 4;  // blocks whose sums stay in registers
+      std::size_t first = 0;
+      for (; first + tile * detail::block_size <= room_; first += tile * detail::block_size)
+        turn_blocks<tile>(first, turned, number_at);
+      for (; first < room_; first += detail::block_size) turn_blocks<1>(first, turned, number_at);
     });
+  }
+
+  /// The turned coordinates from number `first` on, some blocks of them: a sum of columns.
+  template <std::size_t Blocks, class NumberAt>
+  [[gnu::always_inline]] void turn_blocks(std::size_t first, float* turned,
+                                          const NumberAt& number_at) const noexcept {
+    detail::Block<float> sums[Blocks] = {};
+    for (std::size_t a = 0; a < dim_; ++a) {
+      const float number = number_at(a);
+      const float* column = columns_.data() + a * room_ + first;
+      for (std::size_t b = 0; b < Blocks; ++b) {
+        detail::Block<float> numbers;
+        detail::load_block<float>(column + b * detail::block_size, numbers);
+        sums[b] = sums[b] + number * numbers;
+      }
+    }
+    std::memcpy(turned + first, sums, std::min(Blocks * detail::block_size, dim_ - first) * sizeof(float));
   }
 
   [[nodiscard]] std::vector<double> covariance(std::vector<double>& rows) {
@@ -92,15 +109,17 @@ private:
     std::vector<double> values(dim_), vectors(dim_ * dim_);
     if (!symmetric_eigen(std::span(matrix), std::span(values), std::span(vectors), 1e-9))
       raise("PrincipalAxes: coordinates so large that their squares overflow");
-    columns_.resize(dim_ * dim_);
+    room_ = (dim_ + detail::block_size - 1) / detail::block_size * detail::block_size;
+    columns_.assign(detail::room_for(dim_, room_, "PrincipalAxes"), 0.0F);
     for (std::size_t i = 0; i < dim_; ++i)
       for (std::size_t a = 0; a < dim_; ++a)
-        columns_[a * dim_ + i] = static_cast<float>(vectors[i * dim_ + a]);
+        columns_[a * room_ + i] = static_cast<float>(vectors[i * dim_ + a]);
   }
 
   std::size_t dim_ = 0;
+  std::size_t room_ = 0;  ///< of a column: whole blocks
   std::vector<float> mean_;
-  std::vector<float> columns_;
+  detail::AlignedVector<float> columns_;
 };
 
 }}  // namespace cairn::CAIRN_ABI
