@@ -57,7 +57,7 @@ TEST_SUITE("principal_axes") {
 
   TEST_CASE("principal_axes: turns every number of points of any dimension, and writes no further") {
     cairn::Random random(cairn_test::seed(9));
-    for (const std::size_t dim : {1, 2, 15, 16, 17, 48, 63, 64, 65, 80, 127, 128, 130}) {
+    for (const unsigned dim : {1U, 2U, 15U, 16U, 17U, 48U, 63U, 64U, 65U, 80U, 127U, 128U, 130U}) {
       CAPTURE(dim);
       std::vector<float> rows(3 * dim);
       for (float& number : rows) number = static_cast<float>(random.normal());
