@@ -37,7 +37,7 @@ namespace cairn { inline namespace CAIRN_ABI {
 /// The number that `text` is from its first to its last character (one leading '+' allowed), or nothing.
 /// "nan" and "inf" are numbers to this function.
 template <class Number = double>
-[[nodiscard]] std::optional<Number> parse_number(std::string_view text) noexcept {
+[[nodiscard]] std::optional<Number> parse_number(std::string_view text) {
   if (text.size() > 1 && text[0] == '+' && text[1] != '-') text.remove_prefix(1);
   Number value{};
   const auto [end, error] = detail::read_number(text.data(), text.data() + text.size(), value);

@@ -91,11 +91,6 @@ public:
     return true;
   }
 
-  /// Asks for the coordinates of a point that one() may measure.
-  void prefetch(PointId id) const noexcept {
-    if (slack_ > 0 && id != no_point) exact_.prefetch(id);
-  }
-
   /// Points of so many blocks, `most_blocks` at most.
   void blocks(const std::int32_t* distances, const PointId* ids, std::size_t count) {
     unsigned masks[most_blocks];
@@ -114,7 +109,10 @@ public:
           visit(distances[place], ids[place]);
         }
     };
-    if (slack_ > 0) each([this](std::int32_t, PointId id) { prefetch(id); });
+    if (slack_ > 0)  // one() may measure them
+      each([this](std::int32_t, PointId id) {
+        if (id != no_point) exact_.prefetch(id);
+      });
     each([this](std::int32_t distance, PointId id) { one(distance, id); });
   }
   static constexpr std::size_t most_blocks = 8;
