@@ -545,6 +545,14 @@ TEST_SUITE("refusals") {
     CHECK(run.measure(sensor, Vector<2>(1.0, 0.0), 1.75).accepted());
   }
 
+  /// Of the very object: a copy's padding may differ.
+  template <class Belief>
+  std::vector<unsigned char> bytes_of(const Belief& belief) {
+    std::vector<unsigned char> bytes(sizeof(belief));
+    std::memcpy(bytes.data(), &belief, sizeof(belief));
+    return bytes;
+  }
+
   // A turn by 1e155 radians has a square that no double holds.
   struct FarTurn {
     using State = cairn::SO3;
@@ -560,9 +568,9 @@ TEST_SUITE("refusals") {
     const auto refuses = [&](const char* name, const auto& filter) {
       CAPTURE(name);
       auto belief = cairn_test::begin_with(filter, prior);
-      const auto before = belief;
+      const auto before = bytes_of(belief);
       CHECK_FALSE(filter.update(belief, FarTurn{}, z).accepted());
-      CHECK(std::memcmp(&belief, &before, sizeof(belief)) == 0);
+      CHECK(bytes_of(belief) == before);
     };
     refuses("Extended", cairn::Extended{});
     refuses("SquareRoot", cairn::SquareRoot{});
@@ -584,9 +592,9 @@ TEST_SUITE("refusals") {
     const auto refuses_far = [&](const char* name, const auto& filter) {
       CAPTURE(name);
       auto belief = cairn_test::begin_with(filter, far);
-      const auto before = belief;
+      const auto before = bytes_of(belief);
       CHECK(filter.update(belief, first, Vector<1>(2e153)).status == Status::not_finite);
-      CHECK(std::memcmp(&belief, &before, sizeof(belief)) == 0);
+      CHECK(bytes_of(belief) == before);
     };
     refuses_far("Kalman", cairn::Kalman{});
     refuses_far("Extended", cairn::Extended{});
