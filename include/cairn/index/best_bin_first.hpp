@@ -12,6 +12,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <limits>
@@ -78,7 +79,7 @@ private:
     Work done;
     for (std::size_t i = 0; i < trees.size(); ++i)
       if (trees[i] != nullptr && !trees[i]->empty() && queue_.takes(0))
-        queue_.push({0, static_cast<std::uint32_t>(i), 0, 0, no_turn});
+        queue_.push({0, static_cast<std::uint32_t>(i), 1, no_turn});
     Real rest = std::numeric_limits<Real>::infinity();  // how near an unvisited cell may be
     Leaf waiting;  // scanned only after the next one has been asked for, so that memory is not waited for
     for (std::size_t leaves = 0; !queue_.empty(); ++leaves) {
@@ -99,12 +100,13 @@ private:
     return !(std::min(rest, queue_.left_out()) < static_cast<Real>(collector.limit()));
   }
 
-  /// A subtree not yet visited: its lower bound (reduced), and the last turn away from the query above it.
+  /// A subtree not yet visited: its lower bound (reduced), its root, and the last turn away from the query
+  /// above that. Nodes are numbered from 1, the children of k are 2 k and 2 k + 1: slot s of depth d is 2^d +
+  /// s.
   struct Cell {
     Real bound;
     std::uint32_t tree;
-    std::uint32_t depth;
-    std::uint32_t slot;
+    std::uint32_t node;
     std::uint32_t turn;
   };
   struct Leaf {
@@ -130,23 +132,23 @@ private:
   /// sides are queued.
   template <class C>
   std::size_t descend(const Tree& tree, Cell cell, const Real* query, const C& collector, Work& work) {
-    for (;; ++cell.depth) {
-      const detail::Range leaves = detail::TreeAccess::layout(tree).leaves_below(cell.depth, cell.slot);
+    for (unsigned depth = static_cast<unsigned>(std::bit_width(cell.node)) - 1;; ++depth) {
+      const std::uint32_t slot = cell.node - (1U << depth);
+      const detail::Range leaves = detail::TreeAccess::layout(tree).leaves_below(depth, slot);
       if (leaves.size() == 1) return leaves.begin;
       ++work.nodes;
-      const auto& split = detail::TreeAccess::split(tree, cell.depth, cell.slot);
+      const auto& split = detail::TreeAccess::split(tree, depth, slot);
       const Real offset = query[split.axis] - static_cast<Real>(split.value);
-      const std::uint32_t near = 2 * cell.slot + (offset < 0 ? 0U : 1U);
+      const std::uint32_t near = 2 * cell.node + (offset < 0 ? 0U : 1U);
       const Real old = offset_along(split.axis, cell.turn);
       const Real across =
           detail::offset_across(tree.metric(), query[split.axis], static_cast<Real>(split.value), split.axis);
       const Real bound = detail::moved_bound(tree.metric(), cell.bound, old, across, split.axis);
       if (bound < static_cast<Real>(collector.limit()) && queue_.takes(bound)) {
         turns_.push_back({across, split.axis, cell.turn});
-        queue_.push(
-            {bound, cell.tree, cell.depth + 1, near ^ 1U, static_cast<std::uint32_t>(turns_.size() - 1)});
+        queue_.push({bound, cell.tree, near ^ 1U, static_cast<std::uint32_t>(turns_.size() - 1)});
       }
-      cell.slot = near;
+      cell.node = near;
     }
   }
 

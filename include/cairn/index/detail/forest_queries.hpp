@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -91,12 +92,16 @@ public:
     row_.resize(index.dimension());
     detail::copy_point<Real>(query, row_.size(), row_.data(), {"BestBinFirst: query", 0});
     const auto trees = detail::ForestAccess::trees(index);
+    trees_.assign(trees.rbegin(), trees.rend());  // the largest first: its nearest rule out most of the rest
     auto only_live = detail::ForestAccess::only_live(index, collector);
-    return search_.search(trees, row_.data(), only_live, budget, work);
+    return search_.search(std::span<const Tree* const>(trees_), row_.data(), only_live, budget, work);
   }
 
 private:
-  BestBinFirst<typename Index::Tree> search_;
+  using Tree = typename Index::Tree;
+
+  BestBinFirst<Tree> search_;
+  std::vector<const Tree*> trees_;
   std::vector<Real> row_;
 };
 
