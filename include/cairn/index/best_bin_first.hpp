@@ -101,8 +101,7 @@ private:
   }
 
   /// A subtree not yet visited: its lower bound (reduced), its root, and the last turn away from the query
-  /// above that. Nodes are numbered from 1, the children of k are 2 k and 2 k + 1: slot s of depth d is 2^d +
-  /// s.
+  /// above that. Slot s of depth d is node 2^d + s, so that the children of node k are 2 k and 2 k + 1.
   struct Cell {
     Real bound;
     std::uint32_t tree;
