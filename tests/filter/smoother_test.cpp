@@ -49,6 +49,13 @@ Recorder<Kalman, Vector<1>> filter_nile(const Gaussian<Vector<1>>& prior, double
   return recorder;
 }
 
+// Whether the compiler may round a product and a sum once: last digits differ then.
+#if defined(__FMA__) || defined(__aarch64__)
+constexpr bool fused_products = true;
+#else
+constexpr bool fused_products = false;
+#endif
+
 // Relative agreement to about 12 digits.
 void check_digits(double value, double expected, double tolerance = 1e-12) {
   CAPTURE(expected);
@@ -200,9 +207,7 @@ TEST_SUITE("smoother") {
       const auto path = recorder.smoothed();
       CHECK((path[0].covariance - Matrix<2>::Ones()).norm() < 1e-6);
     }
-#if !defined(__FMA__) && !defined(__aarch64__)  // fused products are exact here: nothing to mend
-    CHECK(mended > 3);
-#endif
+    if (!fused_products) CHECK(mended > 3);  // fused ones are exact here: nothing to mend
 
     Matrix<2> indefinite{{1, 2}, {2, 1}};
     Recorder<Kalman, Vector<2>> recorder(Kalman{}, {Vector<2>::Ones(), indefinite});
@@ -272,8 +277,8 @@ TEST_SUITE("steady_state") {
     CHECK(settled(1).status == Status::not_converged);
     const auto noisy = settled(1e4);
     REQUIRE(noisy.accepted());
-    check_digits(noisy.updated(0, 0), 0.000898385649113, 1e-8);
-    check_digits(noisy.updated(1, 1), 0.00429838795934, 1e-8);
+    check_digits(noisy.updated(0, 0), 0.000898385649113, fused_products ? 1e-8 : 1e-9);
+    check_digits(noisy.updated(1, 1), 0.00429838795934, fused_products ? 1e-8 : 1e-9);
     check_digits(noisy.updated(2, 2), 9352.21211484, 1e-3);
   }
 

@@ -66,7 +66,7 @@ TEST_SUITE("best_bin_first") {
       };
       for (int i = 0; i < 5; ++i) add(0);
       for (std::size_t taken = 0; taken < std::min<std::size_t>(leaves, 40) && !all.empty(); ++taken) {
-        REQUIRE(!queue.empty());
+        REQUIRE(!queue.done());
         const Bound cell = queue.pop();
         if (leaves < 256)
           REQUIRE(cell == all.front());
@@ -75,10 +75,8 @@ TEST_SUITE("best_bin_first") {
         all.erase(all.begin());
         for (int i = 0; i < 4; ++i) add(cell.bound + std::floor(static_cast<float>(random.uniform(0, 6))));
       }
-      if (leaves < 40) {
-        REQUIRE(queue.empty());
-        REQUIRE(queue.left_out() == all.front().bound);
-      }
+      REQUIRE(queue.done() == (leaves < 40));
+      REQUIRE(queue.left_out() == all.front().bound);
     }
   }
 

@@ -15,7 +15,6 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <span>
 #include <vector>
 
@@ -80,15 +79,10 @@ private:
     for (std::size_t i = 0; i < trees.size(); ++i)
       if (trees[i] != nullptr && !trees[i]->empty() && queue_.takes(0))
         queue_.push({0, static_cast<std::uint32_t>(i), 1, no_turn});
-    Real rest = std::numeric_limits<Real>::infinity();  // how near an unvisited cell may be
     Leaf waiting;  // scanned only after the next one has been asked for, so that memory is not waited for
-    for (std::size_t leaves = 0; !queue_.empty(); ++leaves) {
+    while (!queue_.done()) {
       const Cell cell = queue_.pop();
       if (!(cell.bound < static_cast<Real>(collector.limit()))) break;
-      if (leaves == budget.leaves) {
-        rest = cell.bound;
-        break;
-      }
       const Real* const query = query_of(cell.tree);
       const Leaf next{trees[cell.tree], query, descend(*trees[cell.tree], cell, query, collector, done)};
       prefetch(next);
@@ -97,7 +91,7 @@ private:
     }
     if (waiting.tree != nullptr) scan(waiting, collector, done);
     if (work != nullptr) *work += done;
-    return !(std::min(rest, queue_.left_out()) < static_cast<Real>(collector.limit()));
+    return !(queue_.left_out() < static_cast<Real>(collector.limit()));
   }
 
   /// A subtree not yet visited: its lower bound (reduced), its root, and the last turn away from the query

@@ -14,9 +14,9 @@
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
-/// Cell: has a `bound`, how near it may be. Where few leaves are left of the budget, no more cells than those
-/// are kept, sorted: most others are turned away by one comparison, and the nearest is at hand. Equal bounds
-/// come out as they went in. Where many are left, or all, the cells are a heap.
+/// Cell: has a `bound`, how near it may be. Under a budget of few leaves no more cells are kept than can
+/// still be visited, sorted: most others are turned away by one comparison, and the nearest is at hand. Equal
+/// bounds come out as they went in. Under a larger one, or none, the cells are a heap.
 template <class Cell>
 class CellQueue {
 public:
@@ -27,18 +27,22 @@ public:
     cells_.clear();
     sorted_ = leaves <= few_leaves;
     room_ = leaves;
-    left_out_ = std::numeric_limits<Real>::infinity();
+    turned_away_ = std::numeric_limits<Real>::infinity();
   }
 
-  [[nodiscard]] bool empty() const noexcept { return cells_.empty(); }
-  /// The least bound of those that were turned away.
-  [[nodiscard]] Real left_out() const noexcept { return left_out_; }
+  /// True where no cell is left, or no leaf of the budget.
+  [[nodiscard]] bool done() const noexcept { return cells_.empty() || room_ == 0; }
+  /// The least bound of the cells that were not taken out.
+  [[nodiscard]] Real left_out() const noexcept {
+    if (cells_.empty()) return turned_away_;
+    return std::min(turned_away_, (sorted_ ? cells_.back() : cells_.front()).bound);
+  }
 
-  /// False, and remembered by left_out(), where a cell of this bound is farther than as many as can be
+  /// False, and remembered for left_out(), where a cell of this bound is farther than as many as can be
   /// visited: push() is for the others.
   [[nodiscard]] bool takes(Real bound) noexcept {
     if (!sorted_ || cells_.size() < room_ || (room_ != 0 && bound < cells_.front().bound)) return true;
-    left_out_ = std::min(left_out_, bound);
+    turned_away_ = std::min(turned_away_, bound);
     return false;
   }
 
@@ -52,14 +56,14 @@ public:
       for (; place != cells_.begin() && !Farther{}(place[-1], cell); --place) *place = place[-1];
       *place = cell;
     } else {
-      left_out_ = std::min(left_out_, cells_.front().bound);
+      turned_away_ = std::min(turned_away_, cells_.front().bound);
       auto place = cells_.begin();  // the farthest, which goes; those nearer than it move down
       for (; place + 1 != cells_.end() && Farther{}(place[1], cell); ++place) *place = place[1];
       *place = cell;
     }
   }
 
-  /// Takes out the nearest cell. There must be one.
+  /// Takes out the nearest cell, for a leaf of the budget. Not where done().
   Cell pop() {
     if (!sorted_) std::pop_heap(cells_.begin(), cells_.end(), Farther{});
     const Cell cell = cells_.back();
@@ -79,7 +83,7 @@ private:
   std::vector<Cell> cells_;
   bool sorted_ = false;
   std::size_t room_ = 0;  ///< leaves of the budget that are not spent
-  Real left_out_ = std::numeric_limits<Real>::infinity();
+  Real turned_away_ = std::numeric_limits<Real>::infinity();
 };
 
 }}}  // namespace cairn::CAIRN_ABI::detail
