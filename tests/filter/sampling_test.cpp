@@ -89,6 +89,45 @@ TEST_SUITE("batch") {
     CHECK(cairn::BatchKalman{}.update(of_one, unknown) == 0);
   }
 
+  TEST_CASE_TEMPLATE("batch: in any unit a lane decides as Kalman does", Size, std::integral_constant<int, 1>,
+                     std::integral_constant<int, 2>, std::integral_constant<int, 3>,
+                     std::integral_constant<int, 4>) {
+    constexpr int n = Size::value;
+    const auto seed = cairn_test::seed();
+    CAPTURE(seed);
+    cairn::Random random(seed);
+    cairn::GaussianBatch<n> batch, seen;
+    std::vector<Gaussian<Vector<n>>> singles;
+    for (int power = -140; power <= 140; power += 4) {  // variances; where sigmas leave doubles, both refuse
+      const double unit = std::pow(10.0, power);
+      for (int kind = 0; kind < 3; ++kind) {
+        Matrix<n> r = cairn_test::random_covariance<n>(random);
+        if (kind == 1) r(0, 0) *= 1e-3;  // mostly no covariance
+        if (kind == 2) {                 // costs most of the digits of the last state
+          r.col(n - 1) *= 1e-7;
+          r.row(n - 1) *= 1e-7;
+        }
+        singles.push_back({std::sqrt(unit) * cairn_test::random_matrix<n, 1>(random),
+                           unit * cairn_test::random_covariance<n>(random)});
+        batch.add(singles.back());
+        seen.add({std::sqrt(unit) * cairn_test::random_matrix<n, 1>(random), unit * r});
+      }
+    }
+    std::vector<std::uint8_t> kept(singles.size());
+    const std::size_t count = cairn::BatchKalman{}.update(batch, seen, kept);
+    CHECK(count > singles.size() / 4);
+    for (std::size_t i = 0; i < singles.size(); ++i) {
+      CAPTURE(i);
+      const auto z = seen.get(i);
+      const cairn::LinearSensor<n, n> sensor{Matrix<n>::Identity(), z.covariance};
+      const bool accepted = cairn::Kalman{}.update(singles[i], sensor, z.mean).accepted();
+      CHECK(accepted == (kept[i] == 1));
+      const Vector<n> inverse = singles[i].covariance.diagonal().cwiseSqrt().cwiseInverse();
+      const Matrix<n> off = batch.get(i).covariance - singles[i].covariance;
+      CHECK((inverse.asDiagonal() * off * inverse.asDiagonal()).cwiseAbs().maxCoeff() < 1e-6);
+    }
+  }
+
   TEST_CASE("batch: a lane with bad numbers stays as it was and disturbs no other") {
     const Gaussian<Vector<3>> prior{Vector<3>(1, 2, 3), Matrix<3>::Identity()};
     cairn::GaussianBatch<3> batch(20, prior);

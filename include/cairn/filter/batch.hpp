@@ -137,27 +137,29 @@ struct BatchKalman {
 
 namespace detail {
 
-/// Which lanes of a block took their measurement in, and which would have lost their digits (all bits set, or
-/// zero).
+/// Which lanes of a block may take their measurement in, and which would have lost their digits (all bits
+/// set, or zero).
 template <class Mask>
 struct BlockVerdict {
   Mask good, doubtful;
 };
 
-/// Every bit of a mask is set.
+/// Every bit of a mask is set. Asked of one byte a lane: fewer words.
 template <class Mask>
 [[gnu::always_inline]] [[nodiscard]] inline bool all_lanes(const Mask& mask) {
-  std::uint64_t words[sizeof(Mask) / sizeof(std::uint64_t)];
-  std::memcpy(words, &mask, sizeof(Mask));
-  std::uint64_t all = words[0];
-  for (const std::uint64_t word : words) all &= word;
-  return all == ~std::uint64_t(0);
+  using Bytes [[gnu::vector_size(sizeof(Mask) / sizeof(mask[0]))]] = signed char;
+  const Bytes bytes = __builtin_convertvector(mask, Bytes);
+  Bytes all{};
+  all = ~all;
+  return std::memcmp(&bytes, &all, sizeof(Bytes)) == 0;
 }
 
-/// One block: P and x with z and R.
+/// One block: P and x with z and R, to `next`. What of it is kept is the caller's: where all lanes are good,
+/// as they mostly are, nothing is mixed.
 template <int N, class S>
-[[gnu::always_inline]] inline auto update_block(typename GaussianBatch<N, S>::Block& belief,
-                                                const typename GaussianBatch<N, S>::Block& seen, S gate) {
+[[gnu::always_inline]] inline auto update_block(const typename GaussianBatch<N, S>::Block& belief,
+                                                const typename GaussianBatch<N, S>::Block& seen, S gate,
+                                                typename GaussianBatch<N, S>::Block& next) {
   using Batch = GaussianBatch<N, S>;
   using Lane = typename Batch::Lane;
   Lane w[N][N];  // w[m][i]: P L^-T, column m
@@ -172,13 +174,13 @@ template <int N, class S>
     }
   }
   constexpr S least = S(4) * digits_left<S>;
-  Lane nis = y[0] * S(0);
+  Lane nis{};
   Lane in_s = lower[0][0];  // what is left of a pivot of S above its rounding; NaN shows in the NIS
   for (int m = 0; m < N; ++m) {
     pivot[m] = S(1) / lower[m][m];
     const int place = Batch::place(m, m);
     if (m > 0) in_s = lesser(in_s, lower[m][m] - (belief.covariance[place] + seen.covariance[place]) * least);
-    nis += y[m] * y[m] * pivot[m];
+    nis = m == 0 ? y[m] * y[m] * pivot[m] : nis + y[m] * y[m] * pivot[m];
     for (int i = m + 1; i < N; ++i) {
       const Lane factor = lower[i][m] * pivot[m];
       for (int k = m + 1; k <= i; ++k) lower[i][k] -= factor * lower[k][m];
@@ -186,36 +188,62 @@ template <int N, class S>
       for (int k = 0; k < N; ++k) w[i][k] -= factor * w[m][k];
     }
   }
-  typename Batch::Block next = belief;
-  for (int m = 0; m < N; ++m)
+  for (int m = 0; m < N; ++m) {
+    const typename Batch::Block& before = m == 0 ? belief : next;
     for (int i = 0; i < N; ++i) {
       const Lane scaled = w[m][i] * pivot[m];
-      next.mean[i] += scaled * y[m];
-      for (int j = 0; j <= i; ++j) next.covariance[Batch::place(i, j)] -= scaled * w[m][j];
+      next.mean[i] = before.mean[i] + scaled * y[m];
+      for (int j = 0; j <= i; ++j) {
+        const int place = Batch::place(i, j);
+        next.covariance[place] = before.covariance[place] - scaled * w[m][j];
+      }
     }
+  }
   // And of what is left of P. That has as many negative pivots as R: with both S and P positive, one says
-  // that R is no covariance.
+  // that R is no covariance. Three doubles do without a division, a third of the time: row i is then `scale`
+  // times what elimination leaves of it, a product of four variances at the most. Where that is out of the
+  // range of numbers that have all their digits, the lane is done by itself.
+  constexpr bool divides = N > 3 || sizeof(S) < sizeof(double);
+  constexpr S floor = divides ? S(0) : std::numeric_limits<S>::min() / std::numeric_limits<S>::epsilon();
   Lane in_p = next.covariance[0] - belief.covariance[0] * least;
-  Lane none = (next.mean[0] + seen.covariance[0]) * S(0);  // NaN beside a mean or an R that is not finite
+  Lane none = next.mean[0] + seen.covariance[0];  // not finite beside what is not
   for (int i = 0; i < N; ++i)
     for (int j = 0; j <= i; ++j) lower[i][j] = next.covariance[Batch::place(i, j)];
+  Lane scale{};
   for (int m = 0; m + 1 < N; ++m) {
-    const Lane inverse = S(1) / lower[m][m];
+    const Lane lead = lower[m][m];
+    const Lane inverse = divides ? S(1) / lead : lead;
     for (int i = m + 1; i < N; ++i) {
-      const Lane factor = lower[i][m] * inverse;
-      for (int k = m + 1; k <= i; ++k) lower[i][k] -= factor * lower[k][m];
+      const Lane factor = divides ? lower[i][m] * inverse : lower[i][m];
+      for (int k = m + 1; k <= i; ++k)
+        lower[i][k] = (divides ? lower[i][k] : lead * lower[i][k]) - factor * lower[k][m];
     }
-    in_p = lesser(in_p, lower[m + 1][m + 1] - belief.covariance[Batch::place(m + 1, m + 1)] * least);
-    none += (next.mean[m + 1] + seen.covariance[Batch::place(m + 1, m + 1)]) * S(0);
+    scale = m == 0 ? lead : scale * lead;
+    const int place = Batch::place(m + 1, m + 1);
+    const Lane rounding = belief.covariance[place] * least;
+    in_p = lesser(in_p, lower[m + 1][m + 1] - (divides ? rounding : rounding * scale));
+    none += next.mean[m + 1] + seen.covariance[place] + lower[m + 1][m + 1];
   }
   const auto sound = in_s > S(0);
-  const auto kept = in_p > S(0);
   const auto taken = nis <= gate;
-  const auto good = sound & kept & taken & (none == S(0));
-  for (int i = 0; i < N; ++i) belief.mean[i] = good ? next.mean[i] : belief.mean[i];
-  for (int i = 0; i < Batch::triangle; ++i)
-    belief.covariance[i] = good ? next.covariance[i] : belief.covariance[i];
-  return BlockVerdict<std::remove_const_t<decltype(good)>>{good, ~sound | (taken & ~kept)};
+  const auto good = sound & taken & (in_p > floor) & (none - none == S(0));
+  // Doubtful too: a sum of finite numbers that is not.
+  return BlockVerdict<std::remove_const_t<decltype(good)>>{good, ~sound | (taken & ~good)};
+}
+
+/// The block, or its lanes of `mask`, become those of `next`. Number by number: a copy of the whole would
+/// keep `next` in memory.
+template <class Block, class... Mask>
+[[gnu::always_inline]] inline void take(Block& belief, const Block& next, const Mask&... mask) {
+  const auto one = [&](auto& before, const auto& after) __attribute__((always_inline)) {
+    if constexpr (sizeof...(Mask) == 0)
+      before = after;
+    else
+      before = (mask, ...) ? after : before;
+  };
+  for (int i = 0; i < static_cast<int>(std::size(belief.mean)); ++i) one(belief.mean[i], next.mean[i]);
+  for (int i = 0; i < static_cast<int>(std::size(belief.covariance)); ++i)
+    one(belief.covariance[i], next.covariance[i]);
 }
 
 /// The filter of one lane alone.
@@ -245,13 +273,16 @@ std::size_t BatchKalman::update(GaussianBatch<N, S>& batch, const GaussianBatch<
   constexpr std::size_t lanes = GaussianBatch<N, S>::lanes;
   std::size_t count = 0;
   for (std::size_t b = 0; b < batch.blocks().size(); ++b) {
-    const auto verdict = detail::update_block<N, S>(batch.blocks()[b], seen.blocks()[b], limit);
+    typename GaussianBatch<N, S>::Block next;
+    const auto verdict = detail::update_block<N, S>(batch.blocks()[b], seen.blocks()[b], limit, next);
     const std::size_t first = b * lanes;
     const std::size_t used = batch.size() - first < lanes ? batch.size() - first : lanes;
     if (kept.empty() && used == lanes && detail::all_lanes(verdict.good)) [[likely]] {
+      detail::take(batch.blocks()[b], next);
       count += lanes;
       continue;
     }
+    detail::take(batch.blocks()[b], next, verdict.good);
     for (std::size_t lane = 0; lane < used; ++lane) {
       bool good = verdict.good[lane] != 0;
       if (verdict.doubtful[lane] != 0) [[unlikely]]
