@@ -65,11 +65,12 @@ struct UDFilter {
   template <Manifold X>
   using BeliefOf = UDGaussian<X>;
 
+  // A function of its own: within the caller's loop its columns would not stay in registers.
   template <class F, class U = detail::ControlOf<F>>
     requires(LinearisedProcess<F> || detail::explain_process<F> ||
              detail::explain_jacobian<F, ProcessModel<F>>)
-  Status predict(UDGaussian<typename F::State>& belief, const F& process, double dt,
-                 const U& control = detail::no_control<U>()) const {
+  [[gnu::noinline]] Status predict(UDGaussian<typename F::State>& belief, const F& process, double dt,
+                                   const U& control = detail::no_control<U>()) const {
     using X = typename F::State;
     using S = ScalarOf<X>;
     constexpr int n = dof<X>;
@@ -134,7 +135,8 @@ struct UDFilter {
     if (correlated && in.status == Status::accepted)
       in.status = take_correlated(in, detail::dense_of(jacobian), r, belief, u, d, step);
     regular = regular || correlated;
-    if (in.status == Status::accepted) in.status = verdict(in, regular, belief, u, d, step);
+    if (in.status == Status::accepted && !(regular && sound(in, u, d, step))) [[unlikely]]
+      in.status = verdict(in, regular, belief, u, d, step);
     if (in.status == Status::accepted) [[likely]] {
       Tangent<X> moved;
       step.store(moved.data());
@@ -283,11 +285,13 @@ private:
     return Status::accepted;
   }
 
-  template <int N, class S>
-  [[gnu::always_inline]] static bool finite(const Columns<N, S>& u, const detail::Column<N, S>& d) {
+  template <int N, class S, class... More>
+  [[gnu::always_inline]] static bool finite(const Columns<N, S>& u, const detail::Column<N, S>& d,
+                                            const More&... more) {
     detail::Column<N, S> none = d;
     none.scale(S(0));
     detail::each<N>([&](int j) { none.add(u[j], S(0)); });
+    (none.add(more, S(0)), ...);
     S sum(0);
     detail::each<N>([&](int i) { sum += none[i]; });
     return sum == S(0);
@@ -299,15 +303,23 @@ private:
     d.store(belief.diagonal.data());
   }
 
+  /// Within the gate, and what is kept is finite. The mean shows where it moves, the residual in the NIS,
+  /// what stands beside the diagonal of S in its variances.
+  template <int M, int N, class S>
+  [[gnu::always_inline]] bool sound(const Innovation<M, S>& in, const Columns<N, S>& u,
+                                    const detail::Column<N, S>& d, const detail::Column<N, S>& step) const {
+    return in.nis <= static_cast<S>(gate) && in.covariance.trace() <= std::numeric_limits<S>::max() &&
+           finite(u, d, step);
+  }
+  /// Why an update is not sound, if it is not.
   template <int M, int N, class S, Manifold X>
-  Status verdict(const Innovation<M, S>& in, bool regular, const UDGaussian<X>& belief,
-                 const Columns<N, S>& u, const detail::Column<N, S>& d,
-                 const detail::Column<N, S>& step) const {
+  [[gnu::cold, gnu::noinline]] Status verdict(const Innovation<M, S>& in, bool regular,
+                                              const UDGaussian<X>& belief, const Columns<N, S>& u,
+                                              const detail::Column<N, S>& d,
+                                              const detail::Column<N, S>& step) const {
     if (!all_finite(in.residual) || !all_finite(in.covariance) || !detail::finite_state(belief.mean))
       return Status::not_finite;
-    S moved(0);
-    detail::each<N>([&](int i) { moved += step[i] * S(0); });
-    if (!regular || !(moved == S(0)) || !finite(u, d)) return Status::not_positive_definite;
+    if (!regular || !finite(u, d, step)) return Status::not_positive_definite;
     return in.nis <= static_cast<S>(gate) ? Status::accepted : Status::gated;
   }
 };

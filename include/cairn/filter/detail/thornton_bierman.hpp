@@ -104,16 +104,17 @@ template <class Q, int N, class S>
     const int j = N - 1 - back;
     const S pivot = a[j][j];
     const bool regular = pivot > slack * original[j];
-    bool alone = pivot == S(0);  // nor anything above it
     d[j] = regular ? pivot : S(0);
     const S inverse = regular ? S(1) / pivot : S(0);
     S column[N]{};
     column[j] = S(1);
     each<N>(0, j, [&](int i) {
       if (holds(i, j)) column[i] = a[j][i] * inverse;
-      if (holds(i, j)) alone = alone && a[j][i] == S(0);
     });
-    good = good && (regular || alone);
+    if (!regular) [[unlikely]] {  // a state without noise: nothing stands above its pivot
+      good = good && pivot == S(0);
+      each<N>(0, j, [&](int i) { good = good && (!holds(i, j) || a[j][i] == S(0)); });
+    }
     each<N>(0, j, [&](int i) __attribute__((always_inline)) {
       each<N>(0, i + 1, [&](int k) {
         if (holds(i, j) && holds(k, j)) a[i][k] -= column[i] * a[j][k];
