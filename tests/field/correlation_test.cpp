@@ -54,7 +54,8 @@ TEST_SUITE("correlation") {
     cairn::Random random(cairn_test::seed());
     for (const auto& [w, h, sw, sh] :
          {std::array{7, 5, 3, 2}, std::array{16, 16, 16, 1}, std::array{31, 17, 5, 17},
-          std::array{1, 1, 1, 1}, std::array{64, 3, 2, 3}}) {
+          std::array{1, 1, 1, 1}, std::array{64, 3, 2, 3}, std::array{9, 60, 3, 4},
+          std::array{2, 25, 1, 7}}) {
       const Plane big = noise_plane(w, h, random), small = noise_plane(sw, sh, random);
       const Plane result = cairn::detail::sliding_products(big, small);
       REQUIRE(result.columns == w - sw + 1);
