@@ -38,7 +38,6 @@
 #include <cairn/core/check.hpp>
 #include <cairn/core/explain.hpp>
 #include <cairn/core/linalg.hpp>
-#include <cairn/core/statistics.hpp>
 #include <cairn/field/detail/correlation_refinement.hpp>
 #include <cairn/field/detail/correlation_surface.hpp>
 #include <cairn/field/detail/fft.hpp>
@@ -141,25 +140,31 @@ inline double unexplained(double c) noexcept {
 inline void judge(Fix& fix, const Plane& surface, int column, int row, double exclusion, double samples) {
   const double best = unexplained(surface(column, row));
   const double negligible = best * std::exp(80.0 / samples);  // beyond it a place has less than e^-40
-  RunningMoments elsewhere;
-  double near = 0, far = 0, places = 0;  // likelihoods relative to the best place's
+  const auto beside = [exclusion](int d) { return std::abs(d) <= exclusion; };
+  double near = 0, far = 0, places = 0;    // likelihoods relative to the best place's
+  double count = 0, sum = 0, squares = 0;  // of the places elsewhere, their values less the peak
   fix.second = -1.0;
   for (int r = 0; r < surface.rows; ++r)
     for (int c = 0; c < surface.columns; ++c) {
       const double v = surface(c, r);
       if (v == nothing) continue;
       places += 1.0;
-      const bool is_near = std::hypot(c - column, r - row) <= exclusion;
+      const bool is_near =
+          beside(r - row) && beside(c - column) && std::hypot(c - column, r - row) <= exclusion;
       const double left = unexplained(v);
       if (left < negligible) (is_near ? near : far) += std::pow(best / left, 0.5 * samples);
       if (is_near) continue;
       fix.second = std::max(fix.second, v);
-      elsewhere.add(v);
+      count += 1.0;
+      sum += v - fix.peak;
+      squares += (v - fix.peak) * (v - fix.peak);
     }
   const double nowhere = places * std::pow(best, 0.5 * samples);
   fix.log_odds = std::log(near / std::max(far + nowhere, 1e-300));  // (2)
-  const double deviation = elsewhere.count() > 1 ? std::max(elsewhere.standard_deviation(), 1e-6) : 1.0;
-  fix.peak_to_sidelobe = (fix.peak - elsewhere.mean()) / deviation;
+  const double below = count > 0.0 ? -sum / count : fix.peak;
+  const double variance =
+      count > 1.0 ? std::max((squares - count * below * below) / (count - 1.0), 1e-12) : 1.0;
+  fix.peak_to_sidelobe = below / std::sqrt(variance);
   fix.contrast = unexplained(fix.second) / unexplained(fix.peak);
 }
 

@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <functional>
 #include <span>
 
 #include <cairn/core/linalg.hpp>
@@ -25,14 +26,15 @@
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
-/// Running sums over rectangles: sum of the values in columns [c, c + w), rows [r, r + h).
+/// Running sums over rectangles: sum of of(value) over columns [c, c + w), rows [r, r + h).
 class BoxSums {
 public:
-  explicit BoxSums(const Plane& plane) : sums_(plane.columns + 1, plane.rows + 1) {
+  template <class Of>
+  BoxSums(const Plane& plane, const Of& of) : sums_(plane.columns + 1, plane.rows + 1) {
     for (int r = 0; r < plane.rows; ++r) {
       double row = 0;
       for (int c = 0; c < plane.columns; ++c) {
-        row += plane(c, r);
+        row += of(plane(c, r));
         sums_(c + 1, r + 1) = sums_(c + 1, r) + row;
       }
     }
@@ -56,16 +58,16 @@ MapWindow map_window(const Map& map, const PatchShape& shape, const PatchPlaceme
                      int reach_across) {
   MapWindow window{Plane(shape.along() + 2 * reach_along, shape.across() + 2 * reach_across),
                    Plane(shape.along() + 2 * reach_along, shape.across() + 2 * reach_across)};
-  double sum = 0;
-  double count = 0;
+  double sum = 0, count = 0;
+  double *value = window.value.values.data(), *known = window.known.values.data();
   for (int r = 0; r < window.value.rows; ++r)
-    for (int c = 0; c < window.value.columns; ++c) {
+    for (int c = 0; c < window.value.columns; ++c, ++value, ++known) {
       const int a = c - reach_along - shape.behind, b = shape.half_width + reach_across - r;
       const auto f = map.at(at.x + a * at.along_x + b * at.across_x, at.y + a * at.along_y + b * at.across_y);
-      window.known(c, r) = f ? 1.0 : 0.0;
-      window.value(c, r) = f ? f->value : 0.0;
-      sum += window.value(c, r);
-      count += window.known(c, r);
+      *known = f ? 1.0 : 0.0;
+      *value = f ? f->value : 0.0;
+      sum += *value;
+      count += *known;
     }
   window.complete = count == static_cast<double>(window.value.values.size());
   const double mean = count > 0.0 ? sum / count : 0.0;
@@ -79,15 +81,15 @@ inline constexpr double nothing = -2.0;
 
 inline Plane correlation_surface(const MapWindow& window, const Plane& patch, double smallest_share) {
   const int w = patch.columns, h = patch.rows;
-  Plane squares = window.value;
-  for (double& v : squares.values) v *= v;
   const double whole = static_cast<double>(patch.values.size());
   double patch_energy = 0;
   for (const double v : patch.values) patch_energy += v * v;
   const Plane cross = sliding_products(window.value, patch);
-  const BoxSums values(window.value), energy(squares), known(window.known);
-  Plane patch_sum;
-  if (!window.complete) patch_sum = sliding_products(window.known, patch);
+  const BoxSums values(window.value, std::identity{});
+  const BoxSums energy(window.value, [](double v) { return v * v; });
+  const Plane nowhere;
+  const BoxSums known(window.complete ? nowhere : window.known, std::identity{});
+  const Plane patch_sum = window.complete ? nowhere : sliding_products(window.known, patch);
   const double flat = 1e-12 * energy(0, 0, window.value.columns, window.value.rows) /
                       static_cast<double>(window.value.values.size());
   Plane surface(cross.columns, cross.rows, nothing);
