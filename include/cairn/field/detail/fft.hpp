@@ -234,8 +234,8 @@ public:
         height_(size_of(fast_length(big.rows))),
         row_transform_(fast_length(big.columns)),
         column_transform_(fast_length(big.rows)),
-        memory_(2 * fft_number * std::max(width_, height_)),
-        spectrum_(fft_number * height_padded() * ((width_ + fft_lines - 1) / fft_lines)) {}
+        memory_(2 * fft_number * padded(std::max(width_, height_))),
+        spectrum_(fft_number * padded(height_) * padded(width_) / fft_lines) {}
 
   [[nodiscard]] Plane operator()() {
     Plane result(big_.columns - small_.columns + 1, big_.rows - small_.rows + 1);
@@ -250,12 +250,11 @@ public:
 
 private:
   static std::size_t size_of(int n) noexcept { return static_cast<std::size_t>(n); }
-  [[nodiscard]] std::size_t height_padded() const noexcept {
-    return (height_ + fft_number - 1) / fft_number * fft_number;
-  }
+  /// To whole blocks, of which what lies beyond the end is read and written, and of no use.
+  static std::size_t padded(std::size_t n) noexcept { return (n + fft_number - 1) / fft_number * fft_number; }
   /// A plane of complex numbers lies in strips of four columns, each as the transform wants it.
   [[nodiscard]] double* strip(std::size_t column) noexcept {
-    return spectrum_.data() + fft_number * height_padded() * (column / fft_lines);
+    return spectrum_.data() + fft_number * padded(height_) * (column / fft_lines);
   }
   [[nodiscard]] double* beside() noexcept { return memory_.data() + memory_.size() / 2; }
 
@@ -265,12 +264,15 @@ private:
     std::size_t c = 0;
     if (r + fft_lines <= rows)
       for (; c + fft_lines <= columns; c += fft_lines) {
+        const double* from = &plane.values[r * columns + c];
         FftLane block[fft_lines];
-        for (std::size_t l = 0; l < fft_lines; ++l)
-          std::memcpy(&block[l], &plane.values[(r + l) * columns + c], sizeof(FftLane));
+        each<fft_lines>([&](int l) CAIRN_INLINED {
+          std::memcpy(&block[l], from + size_of(l) * columns, sizeof(FftLane));
+        });
         transpose(block);
-        for (std::size_t l = 0; l < fft_lines; ++l)
-          std::memcpy(part + fft_number * (c + l), &block[l], sizeof(FftLane));
+        each<fft_lines>([&](int l) CAIRN_INLINED {
+          std::memcpy(part + fft_number * (c + size_of(l)), &block[l], sizeof(FftLane));
+        });
       }
     for (; c < width_; ++c)
       for (std::size_t l = 0; l < fft_lines; ++l)
@@ -284,17 +286,20 @@ private:
       fill(small_, r, memory_.data() + fft_lines);
       const double* lines = row_transform_.run(memory_.data(), beside());
       for (std::size_t c = 0; c < width_; c += fft_lines) {
-        FftLane re[fft_lines] = {}, im[fft_lines] = {};
-        for (std::size_t l = 0; l < std::min(fft_lines, width_ - c); ++l) {
-          std::memcpy(&re[l], lines + fft_number * (c + l), sizeof(FftLane));
-          std::memcpy(&im[l], lines + fft_number * (c + l) + fft_lines, sizeof(FftLane));
-        }
+        FftLane re[fft_lines], im[fft_lines];
+        each<fft_lines>([&](int l) CAIRN_INLINED {
+          FftNumber number;
+          number.load(lines + fft_number * (c + size_of(l)));
+          re[l] = number.re;
+          im[l] = number.im;
+        });
         transpose(re);
         transpose(im);
-        for (std::size_t l = 0; l < fft_lines; ++l) {
+        double* to = strip(c) + fft_number * r;
+        each<fft_lines>([&](int l) CAIRN_INLINED {
           const FftNumber number{re[l], im[l]};
-          number.store(strip(c) + fft_number * (r + l));
-        }
+          number.store(to + fft_number * size_of(l));
+        });
       }
     }
   }
@@ -345,32 +350,36 @@ private:
     for (std::size_t r = 0; r < rows; r += 2 * fft_lines) {
       for (std::size_t c = 0; c <= middle; c += fft_lines) {
         FftLane re[fft_lines], im[fft_lines], mirrored_re[fft_lines], mirrored_im[fft_lines];
-        for (std::size_t l = 0; l < fft_lines; ++l) {
+        const double* from = strip(c) + fft_number * r;
+        each<fft_lines>([&](int l) CAIRN_INLINED {
           FftNumber first, second;  // with the parts swapped
-          first.load(strip(c) + fft_number * (r + 2 * l));
-          second.load(strip(c) + fft_number * (r + 2 * l + 1));
+          first.load(from + fft_number * size_of(2 * l));
+          second.load(from + fft_number * size_of(2 * l + 1));
           re[l] = first.im - second.re;
           im[l] = first.re + second.im;
           mirrored_re[l] = first.im + second.re;
           mirrored_im[l] = second.im - first.re;
-        }
+        });
         transpose(re);
         transpose(im);
         transpose(mirrored_re);
         transpose(mirrored_im);
-        for (std::size_t l = 0; l < fft_lines && c + l <= middle; ++l) {
+        each<fft_lines>([&](int l) CAIRN_INLINED {
+          const std::size_t column = c + size_of(l);
           const FftNumber number{im[l], re[l]}, mirror{mirrored_im[l], mirrored_re[l]};
-          number.store(memory_.data() + fft_number * (c + l));
-          if (c + l > 0 && 2 * (c + l) != width_)
-            mirror.store(memory_.data() + fft_number * (width_ - c - l));
-        }
+          if (column <= middle) number.store(memory_.data() + fft_number * column);
+          if (column <= middle && column > 0 && 2 * column != width_)
+            mirror.store(memory_.data() + fft_number * (width_ - column));
+        });
       }
       const double* lines = row_transform_.run(memory_.data(), beside());
       for (std::size_t c = 0; c < columns; c += fft_lines)
         for (std::size_t part = 0; part < 2; ++part) {  // swapped: the imaginary part is the first row
-          FftLane block[fft_lines] = {};
-          for (std::size_t l = 0; l < std::min(fft_lines, columns - c); ++l)
-            std::memcpy(&block[l], lines + fft_number * (c + l) + (1 - part) * fft_lines, sizeof(FftLane));
+          const double* from = lines + fft_number * c + (1 - part) * fft_lines;
+          FftLane block[fft_lines];
+          each<fft_lines>([&](int l) CAIRN_INLINED {
+            std::memcpy(&block[l], from + fft_number * size_of(l), sizeof(FftLane));
+          });
           transpose(block);
           for (std::size_t l = 0; l < fft_lines && r + 2 * l + part < rows; ++l) {
             double* to = &result.values[(r + 2 * l + part) * columns + c];
