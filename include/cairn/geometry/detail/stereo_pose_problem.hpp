@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <cstring>
 #include <limits>
 #include <optional>
 #include <span>
@@ -118,15 +119,9 @@ public:
     return step(pose, 3).has_value() && step(pose, 1).has_value();
   }
 
-  void inliers(const SE3& pose, std::span<std::uint8_t> mask) const noexcept {
-    const StereoView view(pose, rig_);
-    with_avx2_lanes([&]() CAIRN_INLINED {
-      StereoStatistics s;
-      for (std::size_t i = 0; i < mask.size(); ++i) {
-        if (i % match_lanes == 0) evaluate(lanes_[i / match_lanes], view, gate_, s);
-        mask[i] = s.chi_squared[i % match_lanes] < gate_;
-      }
-    });
+  void inliers(const SE3& pose, std::span<std::uint8_t> mask) const {
+    const std::vector<double> of_lanes = chi_squares(pose, gate_);
+    for (std::size_t i = 0; i < mask.size(); ++i) mask[i] = of_lanes[i] < gate_;
   }
 
   /// One reweighted Gauss-Newton step with all sigmas taken `widening` times as large, on the matches inside
@@ -254,22 +249,28 @@ private:
   }
 
   // Half the second difference of the cost along a step, over the matches that agree at `pose`.
-  [[nodiscard]] double rise(const SE3& pose, const Vector<6>& step) const noexcept {
-    const StereoView here(pose, rig_), ahead(retract(pose, step), rig_),
-        behind(retract(pose, Vector<6>(-step)), rig_);
+  [[nodiscard]] double rise(const SE3& pose, const Vector<6>& step) const {
     const double most = 100 * gate_;  // of a match that is lost from sight
+    const std::vector<double> here = chi_squares(pose, gate_), ahead = chi_squares(retract(pose, step), most),
+                              behind = chi_squares(retract(pose, Vector<6>(-step)), most);
     double sum = 0;
-    StereoStatistics s, a, b;
-    for (const MatchLanes& m : lanes_) {
-      if (!evaluate(m, here, gate_, s)) continue;
-      evaluate(m, ahead, most, a);
-      evaluate(m, behind, most, b);
-      for (std::size_t lane = 0; lane < match_lanes; ++lane)
-        if (s.chi_squared[lane] < gate_)
-          sum += 0.5 * (std::min(a.chi_squared[lane], most) + std::min(b.chi_squared[lane], most)) -
-                 s.chi_squared[lane];
-    }
+    for (std::size_t i = 0; i < here.size(); ++i)
+      if (here[i] < gate_) sum += 0.5 * (std::min(ahead[i], most) + std::min(behind[i], most)) - here[i];
     return sum;
+  }
+
+  // Of all lanes, exact below the gate; infinite without a match, or where it is out of sight.
+  [[nodiscard]] std::vector<double> chi_squares(const SE3& pose, double gate) const {
+    const StereoView view(pose, rig_);
+    std::vector<double> result(lanes_.size() * match_lanes);
+    with_avx2_lanes([&]() CAIRN_INLINED {
+      StereoStatistics s;
+      for (std::size_t i = 0; i < lanes_.size(); ++i) {
+        evaluate(lanes_[i], view, gate, s);
+        std::memcpy(&result[i * match_lanes], &s.chi_squared, sizeof(MatchLane));
+      }
+    });
+    return result;
   }
 
   // Sine of the smallest angle of the triangle below 0.02, or a side of no length.
