@@ -15,6 +15,7 @@
 #include <cstring>
 #include <limits>
 #include <span>
+#include <type_traits>
 #include <vector>
 
 #include <cairn/core/check.hpp>
@@ -26,6 +27,8 @@
 #include <cairn/filter/matrix_of.hpp>
 #include <cairn/filter/status.hpp>
 #include <cairn/filter/structured.hpp>
+#include <cairn/simd/processor.hpp>
+#include <cairn/simd/registers.hpp>
 #include <cairn/version.hpp>
 
 namespace cairn { inline namespace CAIRN_ABI {
@@ -166,39 +169,39 @@ template <int N, class S>
   Lane pivot[N];
   Lane y[N];
   Lane lower[N][N];
-  for (int i = 0; i < N; ++i) {
+  each<N>([&](int i) CAIRN_INLINED {
     y[i] = seen.mean[i] - belief.mean[i];
-    for (int j = 0; j <= i; ++j) {
+    each<N>(0, i + 1, [&](int j) CAIRN_INLINED {
       w[j][i] = w[i][j] = belief.covariance[Batch::place(i, j)];
       lower[i][j] = belief.covariance[Batch::place(i, j)] + seen.covariance[Batch::place(i, j)];
-    }
-  }
+    });
+  });
   constexpr S least = S(4) * digits_left<S>;
   Lane nis{};
   Lane in_s = lower[0][0];  // what is left of a pivot of S above its rounding; NaN shows in the NIS
-  for (int m = 0; m < N; ++m) {
+  each<N>([&](int m) CAIRN_INLINED {
     pivot[m] = S(1) / lower[m][m];
     const int place = Batch::place(m, m);
     if (m > 0) in_s = lesser(in_s, lower[m][m] - (belief.covariance[place] + seen.covariance[place]) * least);
     nis = m == 0 ? y[m] * y[m] * pivot[m] : nis + y[m] * y[m] * pivot[m];
-    for (int i = m + 1; i < N; ++i) {
+    each<N>(m + 1, N, [&](int i) CAIRN_INLINED {
       const Lane factor = lower[i][m] * pivot[m];
-      for (int k = m + 1; k <= i; ++k) lower[i][k] -= factor * lower[k][m];
+      each<N>(m + 1, i + 1, [&](int k) CAIRN_INLINED { lower[i][k] -= factor * lower[k][m]; });
       y[i] -= factor * y[m];
-      for (int k = 0; k < N; ++k) w[i][k] -= factor * w[m][k];
-    }
-  }
-  for (int m = 0; m < N; ++m) {
+      each<N>([&](int k) CAIRN_INLINED { w[i][k] -= factor * w[m][k]; });
+    });
+  });
+  each<N>([&](int m) CAIRN_INLINED {
     const typename Batch::Block& before = m == 0 ? belief : next;
-    for (int i = 0; i < N; ++i) {
+    each<N>([&](int i) CAIRN_INLINED {
       const Lane scaled = w[m][i] * pivot[m];
       next.mean[i] = before.mean[i] + scaled * y[m];
-      for (int j = 0; j <= i; ++j) {
+      each<N>(0, i + 1, [&](int j) CAIRN_INLINED {
         const int place = Batch::place(i, j);
         next.covariance[place] = before.covariance[place] - scaled * w[m][j];
-      }
-    }
-  }
+      });
+    });
+  });
   // And of what is left of P. That has as many negative pivots as R: with both S and P positive, one says
   // that R is no covariance. Three doubles do without a division, a third of the time: row i is then `scale`
   // times what elimination leaves of it, a product of four variances at the most. Where that is out of the
@@ -207,23 +210,25 @@ template <int N, class S>
   constexpr S floor = divides ? S(0) : std::numeric_limits<S>::min() / std::numeric_limits<S>::epsilon();
   Lane in_p = next.covariance[0] - belief.covariance[0] * least;
   Lane none = next.mean[0] + seen.covariance[0];  // not finite beside what is not
-  for (int i = 0; i < N; ++i)
-    for (int j = 0; j <= i; ++j) lower[i][j] = next.covariance[Batch::place(i, j)];
   Lane scale{};
-  for (int m = 0; m + 1 < N; ++m) {
+  each<N>([&](int i) CAIRN_INLINED {
+    each<N>(0, i + 1, [&](int j) CAIRN_INLINED { lower[i][j] = next.covariance[Batch::place(i, j)]; });
+  });
+  each<N>(0, N - 1, [&](int m) CAIRN_INLINED {
     const Lane lead = lower[m][m];
     const Lane inverse = divides ? S(1) / lead : lead;
-    for (int i = m + 1; i < N; ++i) {
+    each<N>(m + 1, N, [&](int i) CAIRN_INLINED {
       const Lane factor = divides ? lower[i][m] * inverse : lower[i][m];
-      for (int k = m + 1; k <= i; ++k)
+      each<N>(m + 1, i + 1, [&](int k) CAIRN_INLINED {
         lower[i][k] = (divides ? lower[i][k] : lead * lower[i][k]) - factor * lower[k][m];
-    }
+      });
+    });
     scale = m == 0 ? lead : scale * lead;
     const int place = Batch::place(m + 1, m + 1);
     const Lane rounding = belief.covariance[place] * least;
     in_p = lesser(in_p, lower[m + 1][m + 1] - (divides ? rounding : rounding * scale));
     none += next.mean[m + 1] + seen.covariance[place] + lower[m + 1][m + 1];
-  }
+  });
   const auto sound = in_s > S(0);
   const auto taken = nis <= gate;
   const auto good = sound & taken & (in_p > floor) & (none - none == S(0));
@@ -235,15 +240,16 @@ template <int N, class S>
 /// keep `next` in memory.
 template <class Block, class... Mask>
 [[gnu::always_inline]] inline void take(Block& belief, const Block& next, const Mask&... mask) {
-  const auto one = [&](auto& before, const auto& after) __attribute__((always_inline)) {
+  const auto one = [&](auto& before, const auto& after) CAIRN_INLINED {
     if constexpr (sizeof...(Mask) == 0)
       before = after;
     else
       before = (mask, ...) ? after : before;
   };
-  for (int i = 0; i < static_cast<int>(std::size(belief.mean)); ++i) one(belief.mean[i], next.mean[i]);
-  for (int i = 0; i < static_cast<int>(std::size(belief.covariance)); ++i)
-    one(belief.covariance[i], next.covariance[i]);
+  constexpr int means = static_cast<int>(std::extent_v<decltype(belief.mean)>);
+  constexpr int covariances = static_cast<int>(std::extent_v<decltype(belief.covariance)>);
+  each<means>([&](int i) CAIRN_INLINED { one(belief.mean[i], next.mean[i]); });
+  each<covariances>([&](int i) CAIRN_INLINED { one(belief.covariance[i], next.covariance[i]); });
 }
 
 /// The filter of one lane alone.
