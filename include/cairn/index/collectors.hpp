@@ -109,6 +109,21 @@ private:
   Real reduced_;
 };
 
+namespace detail {
+
+/// Whether a collector wants only the nearest point of a leaf, of equally near ones the first: then no other
+/// is offered, which saves a branch for each point and those that processors predict wrongly.
+template <class C>
+inline constexpr bool keeps_one = false;
+template <class Real>
+inline constexpr bool keeps_one<Nearest<Real>> = true;
+
+/// Whether a collector lets only some points through to another: OnlyLive (detail/forest_queries.hpp).
+template <class C>
+inline constexpr bool sifts = false;
+
+}  // namespace detail
+
 /// Keeps the nearest and the second nearest: what a ratio test needs. `M` is the metric of the search.
 template <class Real, class M = L2>
 class NearestTwo {

@@ -13,6 +13,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <new>
 #include <type_traits>
 #include <vector>
@@ -75,22 +76,41 @@ template <class Real, class Scalar>
 #endif
 }
 
+/// Bit i is set where truth i is -1, not 0.
+[[nodiscard, gnu::always_inline]] inline unsigned mask_of(const Block<std::int32_t>& truths) noexcept {
+#if defined(__x86_64__)
+  __m128i quarter[4];
+  std::memcpy(quarter, &truths, sizeof(truths));
+  const __m128i low = _mm_packs_epi32(quarter[0], quarter[1]);
+  const __m128i high = _mm_packs_epi32(quarter[2], quarter[3]);
+  return static_cast<unsigned>(_mm_movemask_epi8(_mm_packs_epi16(low, high)));
+#else
+  unsigned mask = 0;
+  for (std::size_t i = 0; i < block_size; ++i) mask |= static_cast<unsigned>(truths[i] != 0) << i;
+  return mask;
+#endif
+}
+
 /// Bit i is set where number i is below the limit.
 template <class Real>
 [[gnu::always_inline]] inline unsigned mask_below(const Block<Real>& numbers, Real limit) noexcept {
-#if defined(__x86_64__)
   if constexpr (sizeof(Real) == 4) {
-    const auto below = numbers < limit;
-    __m128i quarter[4];
-    std::memcpy(quarter, &below, sizeof(below));
-    const __m128i low = _mm_packs_epi32(quarter[0], quarter[1]);
-    const __m128i high = _mm_packs_epi32(quarter[2], quarter[3]);
-    return static_cast<unsigned>(_mm_movemask_epi8(_mm_packs_epi16(low, high)));
+    const Block<std::int32_t> below = numbers < limit;
+    return mask_of(below);
+  } else {
+    unsigned mask = 0;
+    for (std::size_t i = 0; i < block_size; ++i) mask |= static_cast<unsigned>(numbers[i] < limit) << i;
+    return mask;
   }
-#endif
-  unsigned mask = 0;
-  for (std::size_t i = 0; i < block_size; ++i) mask |= static_cast<unsigned>(numbers[i] < limit) << i;
-  return mask;
+}
+
+/// Numbers whose bit is not set become infinite.
+[[gnu::always_inline]] inline void keep_lanes(Block<float>& numbers, unsigned mask) noexcept {
+  const Block<std::int32_t> bits = {1 << 0, 1 << 1, 1 << 2,  1 << 3,  1 << 4,  1 << 5,  1 << 6,  1 << 7,
+                                    1 << 8, 1 << 9, 1 << 10, 1 << 11, 1 << 12, 1 << 13, 1 << 14, 1 << 15};
+  numbers = (bits & static_cast<std::int32_t>(mask)) != 0
+                ? numbers
+                : Block<float>{} + std::numeric_limits<float>::infinity();
 }
 
 /// Smallest of sixteen numbers, none of them NaN.

@@ -8,8 +8,8 @@
 /// The levels of the binary tree are taken four at a time from the leaves up; the root takes what remains.
 /// Node j of level w has its children at f j, ..., f j + f - 1 of the level below (f: fan-out of the level),
 /// so there are no pointers. A search keeps, for every level on its path, the sixteen lower bounds of the
-/// children not yet visited, each with the child's number in its last four bits, and always descends to the
-/// nearest.
+/// children, each with the child's number in its last four bits, and always descends to the nearest that is
+/// not yet visited: the smallest key above the last one.
 #pragma once
 
 #include <array>
@@ -58,12 +58,13 @@ public:
 
   [[nodiscard]] std::size_t bytes() const noexcept { return boxes_.capacity() * sizeof(Real); }
 
-  /// How far a search has come: the children that wait at every level of its path, as keys, and the nearest
-  /// of the last level, whose memory has been asked for. Level w of the nodes is w + 1 here: above the root
-  /// stands a node whose only child it is.
+  /// How far a search has come: the children at every level of its path, as keys, the key that was visited
+  /// last, and the nearest of the last level, whose memory has been asked for. Level w of the nodes is w + 1
+  /// here: above the root stands a node whose only child it is.
   struct Walk {
-    Block<Bits> waiting[max_levels + 1];
+    Block<Bits> keys[max_levels + 1];
     std::size_t node_of[max_levels + 1];
+    Bits last[max_levels + 1];
     unsigned level;
     Bits next;
   };
@@ -75,7 +76,7 @@ public:
   [[gnu::always_inline]] void enter(Walk& walk) const {
     walk.level = 0;
     walk.node_of[0] = 0;
-    walk.waiting[0] = Block<Bits>{} + none;
+    walk.keys[0] = Block<Bits>{} + none;
     walk.next = layout_.leaves() > 0 ? Bits{0} : none;
   }
 
@@ -85,31 +86,39 @@ public:
   template <class M, class C>
   [[gnu::always_inline]] bool advance(Walk& walk, const LeafBlocks<Scalar>& blocks, const Real* query,
                                       std::size_t dim, const M& metric, C& collector, Work& work) const {
-    while (!(bound_of(walk.next) < static_cast<Real>(collector.limit()))) {
-      if (walk.level <= 1) return false;
-      walk.next = smallest<Bits>(walk.waiting[--walk.level]);
-    }
-    const auto lane = static_cast<std::size_t>(walk.next & 15);
-    walk.waiting[walk.level][lane] = none;
-    const std::size_t child = child_at(walk, lane);
-    if (walk.level >= levels_) {
-      walk.next = smallest<Bits>(walk.waiting[walk.level]);
+    for (;;) {
+      const bool near_enough = bound_of(walk.next) < static_cast<Real>(collector.limit());
+      std::size_t child = 0;
+      if (near_enough) {
+        child = child_at(walk, walk.next);
+        if constexpr (struck_out)
+          walk.keys[walk.level][static_cast<std::size_t>(walk.next & 15)] = none;
+        else
+          walk.last[walk.level] = walk.next;
+        if (walk.level < levels_) {
+          walk.node_of[++walk.level] = child;
+          bound_children(walk.level - 1, child, query, dim, metric, collector, walk.keys[walk.level], work);
+          walk.next = smallest<Bits>(walk.keys[walk.level]);
+          return true;
+        }
+      } else {
+        if (walk.level <= 1) return false;
+        --walk.level;
+      }
+      walk.next = next_of(walk);  // once for a leaf and for a way back: it is inlined
+      if (!near_enough) continue;
       if (bound_of(walk.next) < static_cast<Real>(collector.limit()))
-        blocks.prefetch(leaf_of(child_at(walk, static_cast<std::size_t>(walk.next & 15))), dim);
+        blocks.prefetch(leaf_of(child_at(walk, walk.next)), dim);
       scan(blocks, leaf_of(child), query, dim, metric, collector, work);
       return true;
     }
-    walk.node_of[++walk.level] = child;
-    bound_children(walk.level - 1, child, query, dim, metric, collector, walk.waiting[walk.level], work);
-    walk.next = smallest<Bits>(walk.waiting[walk.level]);
-    return true;
   }
 
   /// Asks for the memory of what is next.
   [[gnu::always_inline]] void prefetch(const Walk& walk, const LeafBlocks<Scalar>& blocks,
                                        std::size_t dim) const noexcept {
     if (walk.next == none) return;
-    const std::size_t child = child_at(walk, static_cast<std::size_t>(walk.next & 15));
+    const std::size_t child = child_at(walk, walk.next);
     if (walk.level >= levels_) return blocks.prefetch(leaf_of(child), dim);
     const auto* bytes = reinterpret_cast<const char*>(boxes_.data() + (first_node_[walk.level] + child) *
                                                                           (2 * dim * block_size));
@@ -129,6 +138,9 @@ public:
 
 private:
   static constexpr Bits none = std::numeric_limits<Bits>::max();
+  /// Whether a key that was visited becomes `none`. Else keys stay as they were written, since a changed one
+  /// holds up the next reading of all sixteen; but gcc 12 compares sixteen keys of eight bytes one by one.
+  static constexpr bool struck_out = sizeof(Bits) == 8;
 
   [[nodiscard]] std::size_t node_size() const noexcept { return 2 * dim_ * block_size; }
   [[nodiscard]] unsigned root_bits() const noexcept { return layout_.depth() - 4 * (levels_ - 1); }
@@ -147,9 +159,18 @@ private:
     return boxes_.data() + (first_node_[level] + node) * (2 * dim_ * block_size);
   }
 
-  /// Number, within its level, of the child in a lane of the node where a search stands.
-  [[gnu::always_inline]] std::size_t child_at(const Walk& walk, std::size_t lane) const noexcept {
-    return (walk.node_of[walk.level] << (walk.level == 1 ? root_bits() : 4)) + lane;
+  /// The nearest child, of the node where a search stands, that it has not visited.
+  [[gnu::always_inline]] static Bits next_of(const Walk& walk) noexcept {
+    const Block<Bits>& keys = walk.keys[walk.level];
+    if constexpr (struck_out) return smallest<Bits>(keys);
+    const Block<Bits> later = keys > walk.last[walk.level] ? keys : (Block<Bits>{} + none);
+    return smallest<Bits>(later);
+  }
+
+  /// Number, within its level, of a child of the node where a search stands. The root has number 0, so its
+  /// fan-out, which may be less than sixteen, does not matter.
+  [[gnu::always_inline]] static std::size_t child_at(const Walk& walk, Bits key) noexcept {
+    return (walk.node_of[walk.level] << 4) + static_cast<std::size_t>(key & 15);
   }
   [[nodiscard]] std::size_t leaf_of(std::size_t child) const noexcept {
     return layout_.first_leaf(layout_.depth(), child);

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <optional>
 #include <span>
@@ -42,7 +43,25 @@ struct OnlyLive {
   void offer(PointId id, Real reduced) {
     if (state == nullptr || state[id] == PointState::live) collector->offer(id, reduced);
   }
+
+  /// Leaves are sifted as a whole (leaf_blocks.hpp). Whether anything may be held back.
+  [[nodiscard]] bool sifting() const noexcept { return state != nullptr; }
+  /// Which points of a leaf, of those in a mask, are not erased. Without a branch for each: who is erased
+  /// cannot be predicted.
+  [[nodiscard, gnu::always_inline]] unsigned live(unsigned mask, const PointId* ids) const noexcept {
+    unsigned live = 0;
+    for (; mask != 0; mask &= mask - 1) {
+      const auto lane = static_cast<unsigned>(std::countr_zero(mask));
+      const PointId id = ids[lane];
+      if (id != no_point) live |= static_cast<unsigned>(state[id] == PointState::live) << lane;
+    }
+    return live;
+  }
 };
+template <class Real, class C>
+inline constexpr bool keeps_one<OnlyLive<Real, C>> = keeps_one<C>;
+template <class Real, class C>
+inline constexpr bool sifts<OnlyLive<Real, C>> = true;
 
 /// For searches of other headers: the trees of a multi-kd-tree, which hold erased points too, and who is not.
 struct ForestAccess {

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -89,7 +90,7 @@ public:
   [[gnu::always_inline]] void scan(std::size_t leaf, const Real* query, std::size_t dim, const M& metric,
                                    C& collector) const {
     Block<Real> sums{};
-    const Scalar* numbers = block(leaf);
+    const Scalar* numbers = coordinates_.data() + leaf * block_size * dim;
     for (std::size_t done = 0; done < dim;) {
       const std::size_t next = done + axes_to_look(dim - done);
       for (std::size_t a = done; a < next; ++a) {
@@ -101,12 +102,7 @@ public:
       done = next;
       if (done < dim && mask_below<Real>(sums, static_cast<Real>(collector.limit())) == 0) return;
     }
-    unsigned mask = mask_below<Real>(sums, static_cast<Real>(collector.limit()));
-    const PointId* numbers_of_points = ids(leaf);
-    for (; mask != 0; mask &= mask - 1) {
-      const auto lane = static_cast<unsigned>(std::countr_zero(mask));
-      if (numbers_of_points[lane] != no_point) collector.offer(numbers_of_points[lane], sums[lane]);
-    }
+    offer(sums, ids(leaf), collector);
   }
 
   /// Calls visit(id, row) for every point of some leaves; row is a span of dim numbers, valid during the
@@ -123,6 +119,40 @@ public:
   }
 
 private:
+  /// Offers the points of a leaf that are nearer than the collector's limit; `sums` are their distances.
+  template <class C>
+  [[gnu::always_inline]] static void offer(Block<Real>& sums, const PointId* ids, C& collector) {
+    // Of eight-byte numbers sixteen are too many for one vector: gcc 12 takes their comparisons apart.
+    if constexpr (keeps_one<C> && sizeof(Real) == 4) {
+      if constexpr (sifts<C>)
+        if (collector.sifting())
+          keep_lanes(sums, collector.live(mask_below<Real>(sums, static_cast<Real>(collector.limit())), ids));
+      // Lanes that repeat the last point come after it, so the first of the nearest is a point.
+      const Real nearest = smallest<Real>(sums);
+      if (!(nearest < static_cast<Real>(collector.limit()))) return;
+      const Block<std::int32_t> equal = sums == nearest;
+      const auto lane = static_cast<std::size_t>(std::countr_zero(mask_of(equal)));
+      taker_of(collector).offer(ids[lane], nearest);
+    } else {
+      unsigned mask = mask_below<Real>(sums, static_cast<Real>(collector.limit()));
+      if constexpr (sifts<C>)
+        if (collector.sifting()) mask = collector.live(mask, ids);
+      for (; mask != 0; mask &= mask - 1) {
+        const auto lane = static_cast<std::size_t>(std::countr_zero(mask));
+        if (ids[lane] != no_point) taker_of(collector).offer(ids[lane], sums[lane]);
+      }
+    }
+  }
+
+  /// The collector that takes what another lets through.
+  template <class C>
+  [[gnu::always_inline]] static auto& taker_of(C& collector) noexcept {
+    if constexpr (sifts<C>)
+      return *collector.collector;
+    else
+      return collector;
+  }
+
   static constexpr std::size_t stride = 16;  ///< axes between looks at whether all sixteen sums are too large
 
   /// Axes that are summed up before the next look, of those left.

@@ -18,54 +18,52 @@
 
 namespace cairn { inline namespace CAIRN_ABI { namespace detail {
 
-/// The walks of up to eight trees.
 template <class Tree>
-class WalksInStep {
-public:
-  using Real = typename Tree::Real;
-  static constexpr std::size_t most = 8;
+using WalkOf = typename BoxTree<typename Tree::Coordinate>::Walk;
 
-  /// `trees` are up to `most`, none empty, smallest first.
-  explicit WalksInStep(std::span<const Tree* const> trees) noexcept : trees_(trees) {}
-
-  template <class M, class C>
-  [[gnu::always_inline]] void search(const Real* query, std::size_t dim, const M& metric, C& collector,
-                                     Work& work) {
-    unsigned deepest = 0;
-    for (const Tree* tree : trees_) deepest = std::max(deepest, TreeAccess::boxes(*tree).levels());
-    // Round by round one move of each tree, then each to its end. One call of advance() for both: it is
-    // inlined, for every width of vectors and every collector.
-    for (unsigned round = 0; round <= deepest + 1; ++round)
-      for (std::size_t i = trees_.size(); i-- > 0;) {
-        const auto& boxes = TreeAccess::boxes(*trees_[i]);
-        const auto& blocks = TreeAccess::blocks(*trees_[i]);
-        const unsigned levels = boxes.levels();
-        if (round + levels < deepest) continue;
-        if (round + levels == deepest) {
-          boxes.enter(walks_[i]);
-          if (levels == 0) continue;  // a leaf comes after the larger trees' first
-        }
-        while (boxes.advance(walks_[i], blocks, query, dim, metric, collector, work))
-          if (round <= deepest) break;
-        if (round < deepest && trees_.size() > 1) boxes.prefetch(walks_[i], blocks, dim);
-      }
+/// Offers the points of some trees, none empty, smallest first. There is a walk for each. They are somebody
+/// else's array: in one of its own gcc 12 computes the place of every number from that of the tree.
+template <class Tree, class C>
+[[gnu::always_inline]] inline void walk_in_step(WalkOf<Tree>* walks, std::span<const Tree* const> trees,
+                                                const typename Tree::Real* query, C& collector, Work& work) {
+  const Tree& any = *trees.back();
+  Work done;  // at hand, where `work` is behind a pointer
+  unsigned deepest = 0;
+  for (std::size_t i = 0; i < trees.size(); ++i) {
+    const auto& boxes = TreeAccess::boxes(*trees[i]);
+    boxes.enter(walks[i]);
+    deepest = std::max(deepest, boxes.levels());
   }
-
-private:
-  std::span<const Tree* const> trees_;
-  std::array<typename BoxTree<typename Tree::Coordinate>::Walk, most> walks_;
-};
+  // Round by round one move of each tree, then each to its end: a tree that is alone at once. One call of
+  // advance() for both: it is inlined, for every width of vectors and every collector.
+  std::size_t first = trees.size();  // of the trees that have begun
+  for (unsigned round = trees.size() == 1 ? deepest + 1 : 0; round <= deepest + 1; ++round) {
+    for (; first > 0; --first) {
+      const unsigned levels = TreeAccess::boxes(*trees[first - 1]).levels();
+      const unsigned begin =
+          levels == 0 ? deepest + 1 : deepest - levels;  // a leaf after the first of others
+      if (round < begin) break;
+    }
+    for (std::size_t i = trees.size(); i-- > first;) {
+      const auto& boxes = TreeAccess::boxes(*trees[i]);
+      const auto& blocks = TreeAccess::blocks(*trees[i]);
+      while (boxes.advance(walks[i], blocks, query, any.dimension(), any.metric(), collector, done))
+        if (round <= deepest) break;
+      if (round < deepest) boxes.prefetch(walks[i], blocks, any.dimension());
+    }
+  }
+  work += done;
+}
 
 /// Offers the points of all trees, which are smallest first, to a collector. `query` holds checked numbers.
 template <class Tree, class C>
 void search_in_step(std::span<const Tree* const> trees, const typename Tree::Real* query, C& collector,
                     Work& work) {
+  std::array<WalkOf<Tree>, 8> walks;
   with_widest_lanes([&]() CAIRN_INLINED {
     for (auto rest = trees; !rest.empty();) {
-      const std::size_t count = std::min(rest.size(), WalksInStep<Tree>::most);
-      const Tree& any = *rest.back();
-      WalksInStep<Tree> walks(rest.last(count));
-      walks.search(query, any.dimension(), any.metric(), collector, work);
+      const std::size_t count = std::min(rest.size(), walks.size());
+      walk_in_step(walks.data(), rest.last(count), query, collector, work);
       rest = rest.first(rest.size() - count);
     }
   });
