@@ -203,7 +203,7 @@ template <int N, class S>
     });
   });
   // And of what is left of P. That has as many negative pivots as R: with both S and P positive, one says
-  // that R is no covariance. Three doubles do without a division, a third of the time: row i is then `scale`
+  // that R is no covariance. Three doubles do without a division, a tenth of the time: row i is then `scale`
   // times what elimination leaves of it, a product of four variances at the most. Where that is out of the
   // range of numbers that have all their digits, the lane is done by itself.
   constexpr bool divides = N > 3 || sizeof(S) < sizeof(double);
@@ -236,20 +236,14 @@ template <int N, class S>
   return BlockVerdict<std::remove_const_t<decltype(good)>>{good, ~sound | (taken & ~good)};
 }
 
-/// The block, or its lanes of `mask`, become those of `next`. Number by number: a copy of the whole would
-/// keep `next` in memory.
-template <class Block, class... Mask>
-[[gnu::always_inline]] inline void take(Block& belief, const Block& next, const Mask&... mask) {
-  const auto one = [&](auto& before, const auto& after) CAIRN_INLINED {
-    if constexpr (sizeof...(Mask) == 0)
-      before = after;
-    else
-      before = (mask, ...) ? after : before;
-  };
+/// Calls take(number, its next) for all numbers of a block. One by one: a copy of the whole would keep `next`
+/// in memory.
+template <class Block, class Take>
+[[gnu::always_inline]] inline void each_number(Block& belief, const Block& next, const Take& take) {
   constexpr int means = static_cast<int>(std::extent_v<decltype(belief.mean)>);
   constexpr int covariances = static_cast<int>(std::extent_v<decltype(belief.covariance)>);
-  each<means>([&](int i) CAIRN_INLINED { one(belief.mean[i], next.mean[i]); });
-  each<covariances>([&](int i) CAIRN_INLINED { one(belief.covariance[i], next.covariance[i]); });
+  each<means>([&](int i) CAIRN_INLINED { take(belief.mean[i], next.mean[i]); });
+  each<covariances>([&](int i) CAIRN_INLINED { take(belief.covariance[i], next.covariance[i]); });
 }
 
 /// The filter of one lane alone.
@@ -284,11 +278,14 @@ std::size_t BatchKalman::update(GaussianBatch<N, S>& batch, const GaussianBatch<
     const std::size_t first = b * lanes;
     const std::size_t used = batch.size() - first < lanes ? batch.size() - first : lanes;
     if (kept.empty() && used == lanes && detail::all_lanes(verdict.good)) [[likely]] {
-      detail::take(batch.blocks()[b], next);
+      detail::each_number(batch.blocks()[b], next,
+                          [](auto& before, const auto& after) CAIRN_INLINED { before = after; });
       count += lanes;
       continue;
     }
-    detail::take(batch.blocks()[b], next, verdict.good);
+    detail::each_number(batch.blocks()[b], next, [&](auto& before, const auto& after) CAIRN_INLINED {
+      before = verdict.good ? after : before;
+    });
     for (std::size_t lane = 0; lane < used; ++lane) {
       bool good = verdict.good[lane] != 0;
       if (verdict.doubtful[lane] != 0) [[unlikely]]
