@@ -141,8 +141,9 @@ inline void judge(Fix& fix, const Plane& surface, int column, int row, double ex
   const double best = unexplained(surface(column, row));
   const double negligible = best * std::exp(80.0 / samples);  // beyond it a place has less than e^-40
   const auto beside = [exclusion](int d) { return std::abs(d) <= exclusion; };
-  double near = 0, far = 0, places = 0;    // likelihoods relative to the best place's
-  double count = 0, sum = 0, squares = 0;  // of the places elsewhere, their values less the peak
+  double near = 0, far = 0, places = 0;  // likelihoods relative to the best place's
+  // Of the places elsewhere, their values less the peak: no division for each, as RunningMoments has.
+  double count = 0, sum = 0, squares = 0;
   fix.second = -1.0;
   for (int r = 0; r < surface.rows; ++r)
     for (int c = 0; c < surface.columns; ++c) {
