@@ -19,7 +19,7 @@ namespace stereo_slam {
 struct ArenaOptions {
   /// turn: 360 degrees on the spot, the last pose is the first. loop: two laps of a rectangle with round
   /// corners, pose for pose over the same ground. spiral: three turns outwards.
-  std::string script = "turn";
+  std::string script = "loop";
   std::uint64_t seed = 1;     ///< of the ground, the boxes and the noise
   int width = 768;            ///< [pixels]
   int height = 576;           ///< [pixels]

@@ -138,8 +138,8 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
       ->check(one_of(stereo_slam::feature_names))
       ->capture_default_str();
   app.add_option("--script", arguments.dataset.arena.script,
-                 "arena: turn (on the spot), loop (two laps) or spiral")
-      ->check(CLI::IsMember({"turn", "loop", "spiral"}))
+                 "arena: loop (two laps), turn (on the spot) or spiral")
+      ->check(CLI::IsMember({"loop", "turn", "spiral"}))
       ->capture_default_str();
   app.add_option("--drift", arguments.dataset.arena.drift,
                  "arena: the right camera turns by so many degrees in 100 frames, unknown to the system")

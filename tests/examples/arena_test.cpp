@@ -175,6 +175,7 @@ Shifts shifts_between(const Shot& first, const Shot& second, std::uint64_t seed)
 
 ArenaOptions small_options(const cairn_test::Folder& folder) {
   ArenaOptions options;
+  options.script = "turn";
   options.width = 192;
   options.height = 144;
   options.cache_folder = folder.path();
