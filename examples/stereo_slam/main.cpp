@@ -33,6 +33,7 @@
 #include "support/interruption.hpp"
 #include "support/live_page.hpp"
 #include "support/progress.hpp"
+#include "support/report.hpp"
 #include "support/result_folder.hpp"
 #include "support/rig_file.hpp"
 #include "support/standard_output.hpp"
@@ -283,16 +284,19 @@ void print_summary(const stereo_slam::RunRecord& record) {
               summary.landmarks);
   if (summary.budget) std::printf("%s\n", stereo_slam::budget_text(*summary.budget).c_str());
   if (!summary.errors) return;
-  std::printf("path %.2f m, error at the end %.3g m, largest %.3g m and %.2g degrees\n", summary.path,
-              summary.errors->end, summary.errors->largest.position,
-              summary.errors->largest.heading * stereo_slam::degrees);
+  const stereo_slam::TruthErrors& errors = *summary.errors;
+  std::printf("path %.2f m, error at the end %s, largest %s and %.2g degrees\n", summary.path,
+              example::readable_length(errors.end).words().c_str(),
+              example::readable_length(errors.largest.position).words().c_str(),
+              errors.largest.heading * stereo_slam::degrees);
 }
 
 /// How far a drive there and back ends from where it began.
 void print_return(const stereo_slam::RunRecord& record) {
   const stereo_slam::ReturnError error = stereo_slam::return_error(record.frames);
-  std::printf("back at the start: %.4f m off after %.1f m (%.3f %%), turned by %.3f degrees\n",
-              error.distance, error.path, error.percent(), error.angle * stereo_slam::degrees);
+  std::printf("back at the start: %s off after %.1f m (%.2g %%), turned by %.2g degrees\n",
+              example::readable_length(error.distance).words().c_str(), error.path, error.percent(),
+              error.angle * stereo_slam::degrees);
 }
 
 }  // namespace

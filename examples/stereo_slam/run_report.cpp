@@ -60,6 +60,10 @@ std::array<float, 3> upright(const cairn::Vector<3>& p) {
 void add_figures(example::Report& report, const Summary& summary) {
   using Verdict = example::KeyFigure::Verdict;
   using example::readable;
+  const auto length = [&](const char* name, double metres, std::string note) {
+    auto [value, unit] = example::readable_length(metres);
+    report.figure({name, std::move(value), std::move(unit), std::move(note)});
+  };
   report.figure({"frames tracked", std::to_string(summary.frames_tracked),
                  "of " + std::to_string(summary.frames),
                  summary.frames_lost == 0 ? "none lost" : std::to_string(summary.frames_lost) + " lost",
@@ -74,7 +78,7 @@ void add_figures(example::Report& report, const Summary& summary) {
     report.figure({"frames that left work out", std::to_string(summary.budget->frames_shed),
                    "of " + std::to_string(summary.frames),
                    "budget of " + readable(summary.budget->milliseconds) + " ms a frame"});
-  report.figure({"path", readable(summary.path), "m", ""});
+  length("path", summary.path, "");
   report.figure({"landmarks", std::to_string(summary.landmarks), "", "in the map at the end"});
   report.figure({"keyframes", std::to_string(summary.keyframes), "", "in the map at the end"});
   report.figure({"loops closed", std::to_string(summary.loops_closed), "", "places met again after long"});
@@ -84,12 +88,11 @@ void add_figures(example::Report& report, const Summary& summary) {
   const TruthErrors& errors = *summary.errors;
   const std::string share =
       summary.path > 0 ? readable(100.0 * errors.end / summary.path) + " % of the path" : "";
-  report.figure({"end error", readable(errors.end), "m", share});
-  report.figure({"max position error", readable(errors.largest.position), "m", "first poses coincide"});
+  length("end error", errors.end, share);
+  length("max position error", errors.largest.position, "first poses coincide");
   report.figure({"max heading error", readable(errors.largest.heading * degrees), "deg",
                  "angle of the whole rotation"});
-  report.figure(
-      {"ATE", readable(errors.ate_rmse), "m", "RMSE of positions, alignment: " + errors.ate_alignment});
+  length("ATE", errors.ate_rmse, "RMSE of positions, alignment: " + errors.ate_alignment);
   if (errors.kitti_translation_percent)
     report.figure({"KITTI drift", readable(*errors.kitti_translation_percent), "%", "over 100 to 800 m"});
   if (errors.consistency)
@@ -97,8 +100,8 @@ void add_figures(example::Report& report, const Summary& summary) {
                    "6 where the covariance is right; " + readable(100 * errors.consistency->nees_above_999) +
                        " % of the frames above 22.5"});
   if (errors.revisit)
-    report.figure({"same place again", readable(errors.revisit->position), "m",
-                   "largest disagreement of " + std::to_string(errors.revisit->pairs) + " returns"});
+    length("same place again", errors.revisit->position,
+           "largest disagreement of " + std::to_string(errors.revisit->pairs) + " returns");
 }
 
 /// The path as it was known while driving and as the map has it at the end, errors drawn so much larger that
@@ -171,11 +174,11 @@ std::optional<example::PlaneFilm> correction_film(const RunRecord& run, const Su
     if (step == 0) {
       frame.caption = "As it was estimated while driving";
       if (summary.path_error)
-        frame.caption += ", RMSE " + example::readable(summary.path_error->while_driving) + " m";
+        frame.caption += ", RMSE " + example::readable_length(summary.path_error->while_driving).words();
     } else if (step == steps) {
       frame.caption = "As the map has it at the end";
       if (summary.path_error)
-        frame.caption += ", RMSE " + example::readable(summary.path_error->at_the_end) + " m";
+        frame.caption += ", RMSE " + example::readable_length(summary.path_error->at_the_end).words();
     } else {
       frame.caption = "Between the two";
     }
@@ -190,15 +193,16 @@ std::optional<example::Table> loop_table(const Summary& summary) {
                        .caption =
                            "Pose of the first frame of each return, by the landmarks that were in view "
                            "just before alone and with those that came back.",
-                       .columns = {"frame", "landmarks back", "after frames", "moved by [m]",
-                                   "turned by [deg]", "error before [m]", "error after [m]"},
+                       .columns = {"frame", "landmarks back", "after frames", "moved by", "turned by [deg]",
+                                   "error before", "error after"},
                        .rows = {}};
+  const auto length = [](double metres) { return example::readable_length(metres).words(); };
   for (const LoopEffect& loop : summary.loops)
     table.rows.push_back({std::to_string(loop.frame), std::to_string(loop.landmarks),
-                          std::to_string(loop.away), example::readable(loop.correction.position),
+                          std::to_string(loop.away), length(loop.correction.position),
                           example::readable(loop.correction.heading * degrees),
-                          loop.before ? example::readable(loop.before->position) : "no truth",
-                          loop.after ? example::readable(loop.after->position) : "no truth"});
+                          loop.before ? length(loop.before->position) : "no truth",
+                          loop.after ? length(loop.after->position) : "no truth"});
   return table;
 }
 

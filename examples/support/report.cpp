@@ -388,4 +388,11 @@ std::string readable(double value, int digits) {
   return {text, printed.ptr};
 }
 
+ReadableLength readable_length(double metres) {
+  const double size = std::abs(metres);
+  if (size >= 1e-5 && size < 1e-2) return {readable(1e3 * metres), "mm"};
+  if (size > 0 && size < 1e-5) return {readable(1e6 * metres), "um"};
+  return {readable(metres), "m"};
+}
+
 }  // namespace example

@@ -267,4 +267,12 @@ private:
 /// million all digits before the point, "12345"; "none" where it is not finite.
 [[nodiscard]] std::string readable(double value, int digits = 3);
 
+/// A length in the unit that people would say it in: metres, millimetres under a centimetre, micrometres
+/// under ten of them. {"1.23", "m"}, {"7.26", "mm"}, {"1.68", "um"}; in words as one text, "7.26 mm".
+struct ReadableLength {
+  std::string value, unit;
+  [[nodiscard]] std::string words() const { return value + " " + unit; }
+};
+[[nodiscard]] ReadableLength readable_length(double metres);
+
 }  // namespace example

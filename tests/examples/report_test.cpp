@@ -172,6 +172,13 @@ TEST_CASE("report: readable numbers are short") {
   CHECK(example::readable(999.6) == "1000");
   CHECK(example::readable(12, 2) == "12");
   CHECK(example::readable(not_a_number) == "none");
+  CHECK(example::readable_length(12.345).words() == "12.3 m");
+  CHECK(example::readable_length(-0.0123).words() == "-0.0123 m");
+  CHECK(example::readable_length(0.01).words() == "0.01 m");
+  CHECK(example::readable_length(0.000726).words() == "0.726 mm");
+  CHECK(example::readable_length(-1.68e-6).words() == "-1.68 um");
+  CHECK(example::readable_length(0).words() == "0 m");
+  CHECK(example::readable_length(not_a_number).words() == "none m");
 }
 
 TEST_SUITE_END();
