@@ -3,7 +3,6 @@
 #include "outputs.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -259,44 +258,17 @@ void add_memory(example::Report& page, const Results& r) {
       .logarithmic = true});
 }
 
-/// Where the pose of a scan may be before it is drawn, at places so far apart that the ellipses do not cover
-/// each other.
+/// Where the pose of a scan may be before it is drawn.
 void add_proposals(example::Report& page, const Results& r) {
   if (r.drawn_from.empty()) return;
-  constexpr double sigmas = 3;
-  std::vector<double> along;  // the longer half axes [m]
-  double left = r.drawn_from.front().mean.x(), bottom = r.drawn_from.front().mean.y(), right = left,
-         top = bottom;
+  std::vector<example::PlaneGaussian> places;
   for (const auto& q : r.drawn_from) {
-    const double middle = 0.5 * (q.covariance(0, 0) + q.covariance(1, 1));
-    along.push_back(sigmas * std::sqrt(middle + std::hypot(middle - q.covariance(1, 1), q.covariance(0, 1))));
-    left = std::min(left, q.mean.x());
-    right = std::max(right, q.mean.x());
-    bottom = std::min(bottom, q.mean.y());
-    top = std::max(top, q.mean.y());
-  }
-  // From one to the next the tenth longest nearly meet, in a factor of one digit.
-  const double apart = 0.07 * std::max({right - left, top - bottom, 1.0});
-  const double most = std::max(1.0, 0.5 * apart / std::max(cairn::quantile(along, 0.9), 1e-6));
-  const double decade = std::pow(10.0, std::floor(std::log10(most)));
-  const double scale = decade * std::floor(most / decade);
-  example::PlaneCurve ellipses{
-      .name = "3 sigma, " + readable(scale) + " times as large", .ink = Ink::violet, .filled = true};
-  std::vector<cairn::Vector<2>> drawn;
-  for (const auto& q : r.drawn_from) {
-    const cairn::Vector<2> at = q.mean.translation();
-    if (std::ranges::any_of(drawn, [&](const auto& other) { return (other - at).norm() < apart; })) continue;
-    drawn.push_back(at);
     const cairn::Matrix<2> R = q.mean.rotation().matrix();
     const cairn::Matrix<2> spread =
         R * q.covariance.topLeftCorner<2, 2>() * R.transpose();  // of the map's axes
-    const auto one = example::ellipse(ellipses.name, ellipses.ink, {at(0), at(1)},
-                                      {spread(0, 0), spread(0, 1), spread(1, 1)}, sigmas * scale);
-    for (auto [all, own] : {std::pair{&ellipses.x, &one.x}, std::pair{&ellipses.y, &one.y}}) {
-      all->insert(all->end(), own->begin(), own->end());
-      all->push_back(std::numeric_limits<double>::quiet_NaN());  // between two of them no line
-    }
+    places.push_back({{q.mean.x(), q.mean.y()}, {spread(0, 0), spread(0, 1), spread(1, 1)}});
   }
+  auto [ellipses, scale] = example::spreads_along(places, Ink::violet);
   const std::string by_scans =
       "Where the pose of a scan may be, by odometry and the scan together, before it is drawn: long along a "
       "corridor, "
@@ -309,7 +281,7 @@ void add_proposals(example::Report& page, const Results& r) {
                                          " times as large, at the first visit of a place.",
                               .x = {"x", "m"},
                               .y = {"y", "m"},
-                              .curves = {curve_of("path", Ink::grey, r.means), ellipses}});
+                              .curves = {curve_of("path", Ink::grey, r.means), std::move(ellipses)}});
 }
 
 /// DP-SLAM's tree as it was at each time, now at the right.

@@ -193,10 +193,10 @@ std::optional<example::Table> loop_table(const Summary& summary) {
                        .caption =
                            "Pose of the first frame of each return, by the landmarks that were in view "
                            "just before alone and with those that came back.",
-                       .columns = {"frame", "landmarks back", "after frames", "moved by", "turned by [deg]",
-                                   "error before", "error after"},
+                       .columns = {"frame", "landmarks back", "after frames", "moved by [mm]",
+                                   "turned by [deg]", "error before [mm]", "error after [mm]"},
                        .rows = {}};
-  const auto length = [](double metres) { return example::readable_length(metres).words(); };
+  const auto length = [](double metres) { return example::readable(1e3 * metres); };
   for (const LoopEffect& loop : summary.loops)
     table.rows.push_back({std::to_string(loop.frame), std::to_string(loop.landmarks),
                           std::to_string(loop.away), length(loop.correction.position),
@@ -213,17 +213,25 @@ example::PlanePlot path_plot(const RunRecord& run) {
                           .y = {"ahead", "m"},
                           .curves = {}};
   example::PlaneCurve truth{"truth", Ink::truth, {}, {}}, belief{"estimate", Ink::belief, {}, {}},
-      lost{"not tracked", Ink::wrong, {}, {}, true};
+      lost{"not tracked", Ink::wrong, {}, {}, true}, keyframes{"keyframes", Ink::teal, {}, {}, true},
+      met{"met again", Ink::measurement, {}, {}, true};
+  std::vector<example::PlaneGaussian> known;
+  const auto add = [](example::PlaneCurve& curve, const cairn::Vector<3>& place) {
+    curve.x.push_back(place(0));
+    curve.y.push_back(place(2));
+  };
   for (const FrameRecord& frame : run.frames) {
     const cairn::Vector<3>& estimate = frame.T_world_camera.translation();
-    truth.x.push_back(frame.truth ? frame.truth->translation()(0) : gap);
-    truth.y.push_back(frame.truth ? frame.truth->translation()(2) : gap);
-    belief.x.push_back(estimate(0));
-    belief.y.push_back(estimate(2));
-    if (frame.tracked) continue;
-    lost.x.push_back(estimate(0));
-    lost.y.push_back(estimate(2));
+    add(truth, frame.truth ? frame.truth->translation() : cairn::Vector<3>(gap, gap, gap));
+    add(belief, estimate);
+    if (!frame.tracked) add(lost, estimate);
+    if (frame.keyframe) add(keyframes, estimate);
+    if (!frame.tracked || !frame.covariance.allFinite()) continue;
+    const cairn::Matrix<3> R = frame.T_world_camera.rotation().matrix();
+    const cairn::Matrix<3> spread = R * frame.covariance.topLeftCorner<3, 3>() * R.transpose();
+    known.push_back({{estimate(0), estimate(2)}, {spread(0, 0), spread(0, 2), spread(2, 2)}});
   }
+  for (const LoopClosure& loop : run.loops) add(met, run.frames[loop.frame].T_world_camera.translation());
   const bool any_truth = std::any_of(run.frames.begin(), run.frames.end(),
                                      [](const FrameRecord& frame) { return frame.truth.has_value(); });
   if (any_truth)
@@ -231,7 +239,13 @@ example::PlanePlot path_plot(const RunRecord& run) {
   else
     plot.caption += " This data has no truth to compare with.";
   plot.curves.push_back(std::move(belief));
-  if (!lost.x.empty()) plot.curves.push_back(std::move(lost));
+  if (auto [ellipses, scale] = example::spreads_along(known, Ink::violet); !ellipses.x.empty()) {
+    plot.caption += " Ellipses: three standard deviations of the pose, drawn " + example::readable(scale) +
+                    " times as large, at the first visit of a place.";
+    plot.curves.push_back(std::move(ellipses));
+  }
+  for (example::PlaneCurve* const dots : {&keyframes, &met, &lost})
+    if (!dots->x.empty()) plot.curves.push_back(std::move(*dots));
   return plot;
 }
 

@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include <cairn/core/check.hpp>
+#include <cairn/core/statistics.hpp>
 #include <cairn/io/text.hpp>
 
 #include "report_template.hpp"
@@ -357,6 +358,43 @@ PlaneCurve ellipse(std::string name, Ink ink, const std::array<double, 2>& mean,
     curve.y.push_back(mean[1] + across * u + upwards * v);
   }
   return curve;
+}
+
+Spreads spreads_along(const std::vector<PlaneGaussian>& path, Ink ink, double sigmas) {
+  Spreads result{.curve = {.ink = ink, .filled = true}};
+  if (path.empty()) return result;
+  std::vector<double> along;  // the longer half axes
+  std::array<double, 2> low = path.front().mean, high = low;
+  for (const PlaneGaussian& place : path) {
+    const auto [xx, xy, yy] = place.covariance;
+    const double middle = 0.5 * (xx + yy);
+    along.push_back(sigmas * std::sqrt(middle + std::hypot(middle - yy, xy)));
+    for (std::size_t i = 0; i < 2; ++i) {
+      low[i] = std::min(low[i], place.mean[i]);
+      high[i] = std::max(high[i], place.mean[i]);
+    }
+  }
+  // From one to the next the tenth longest nearly meet.
+  const double apart = 0.07 * std::max({high[0] - low[0], high[1] - low[1], 1.0});
+  const double most = std::max(1.0, 0.5 * apart / std::max(cairn::quantile(along, 0.9), 1e-6));
+  const double decade = std::pow(10.0, std::floor(std::log10(most)));
+  result.scale = decade * std::floor(most / decade);
+  result.curve.name = readable(sigmas) + " sigma, " + readable(result.scale) + " times as large";
+  std::vector<std::array<double, 2>> drawn;
+  for (const PlaneGaussian& place : path) {
+    const auto near = [&](const std::array<double, 2>& other) {
+      return std::hypot(other[0] - place.mean[0], other[1] - place.mean[1]) < apart;
+    };
+    if (std::ranges::any_of(drawn, near)) continue;
+    drawn.push_back(place.mean);
+    const PlaneCurve one =
+        ellipse(result.curve.name, ink, place.mean, place.covariance, sigmas * result.scale);
+    for (auto [all, own] : {std::pair{&result.curve.x, &one.x}, std::pair{&result.curve.y, &one.y}}) {
+      all->insert(all->end(), own->begin(), own->end());
+      all->push_back(std::numeric_limits<double>::quiet_NaN());  // between two of them no line
+    }
+  }
+  return result;
 }
 
 PlaneCurve area(std::string name, Ink ink, const std::vector<double>& x, const std::vector<double>& low,

@@ -93,6 +93,23 @@ struct PlaneCurve {
 [[nodiscard]] PlaneCurve ellipse(std::string name, Ink ink, const std::array<double, 2>& mean,
                                  const std::array<double, 3>& covariance, double sigmas = 2);
 
+/// A place that is not known exactly: mean (x, y), covariance (xx, xy, yy).
+struct PlaneGaussian {
+  std::array<double, 2> mean = {};
+  std::array<double, 3> covariance = {};
+};
+
+/// Ellipses of some places of a path, as one curve.
+struct Spreads {
+  PlaneCurve curve;  ///< its name says how many sigmas, and how many times as large
+  double scale = 1;
+};
+
+/// How well a path is known, so that it can be seen: ellipses of `sigmas` standard deviations at places so
+/// far apart that they do not cover each other, from the first on, all drawn as many times as large, a number
+/// of one digit and zeros, as that allows. Throws as ellipse() does. O(path * ellipses).
+[[nodiscard]] Spreads spreads_along(const std::vector<PlaneGaussian>& path, Ink ink, double sigmas = 3);
+
 /// What lies between `low` and `high` over x, as an area. Throws cairn::Error where they are not as many.
 [[nodiscard]] PlaneCurve area(std::string name, Ink ink, const std::vector<double>& x,
                               const std::vector<double>& low, const std::vector<double>& high);

@@ -72,6 +72,28 @@ TEST_CASE("report: points are packed as little-endian floats, those not finite l
   CHECK(panel["colourings"][0]["values"] == "AABAQAAAoEA=");     // 00004040 0000a040
 }
 
+TEST_CASE("report: what is known of a path is drawn so that it can be seen, and nothing over another") {
+  std::vector<example::PlaneGaussian> path;
+  for (int i = 0; i <= 200; ++i)  // 100 m eastwards, 0.1 mm by 0.2 mm
+    path.push_back({{0.5 * i, 0}, {1e-8, 0, 4e-8}});
+  const example::Spreads spreads = example::spreads_along(path, Ink::violet, 2);
+  CHECK(spreads.scale == 8000);  // half of 7 m over 2 times 0.2 mm is 8750
+  CHECK(spreads.curve.name == "2 sigma, 8000 times as large");
+  constexpr std::size_t each = 50;               // 49 corners and a gap
+  REQUIRE(spreads.curve.x.size() == 14 * each);  // at 0, 7.5, ..., 97.5 m: 7 m and what rounding adds
+  for (std::size_t i = 0; i < spreads.curve.x.size(); ++i) {
+    if (i % each == each - 1) {
+      CHECK(std::isnan(spreads.curve.x[i]));
+      continue;
+    }
+    const double u = (spreads.curve.x[i] - 7.5 * static_cast<double>(i / each)) / (8000 * 1e-4),
+                 v = spreads.curve.y[i] / (8000 * 2e-4);
+    CHECK(std::hypot(u, v) == doctest::Approx(2));
+  }
+  CHECK(example::spreads_along({}, Ink::violet).curve.x.empty());
+  CHECK(example::spreads_along({{{0, 0}, {4, 0, 9}}}, Ink::violet).scale == 1);  // never smaller
+}
+
 TEST_CASE("report: a panel that does not fit together is refused by name") {
   Report report("title", "");
   const auto lines = [&](std::vector<double> x, std::vector<double> y) {
@@ -119,9 +141,14 @@ TEST_CASE("report: the page asks nothing of the network") {
 }
 
 TEST_CASE("report of a run: every panel of the main job is there") {
-  const auto run = cairn_test::circular_run(60, 200);
+  auto run = cairn_test::circular_run(60, 200);
+  run.frames[7].keyframe = run.frames[9].keyframe = true;
   const auto data = data_of(stereo_slam::run_report(run, stereo_slam::summarise(run)));
-  CHECK(panel_called(data, "Path from above")["curves"].size() == 2);
+  const auto path = panel_called(data, "Path from above")["curves"];
+  CHECK(path.size() == 4);  // truth, estimate and
+  CHECK(path[2]["name"] == "3 sigma, 9 times as large");
+  CHECK(path[3]["name"] == "keyframes");
+  CHECK(path[3]["x"].size() == 2);
   CHECK(panel_called(data, "Position error")["curves"][0]["values"].size() == 60);
   CHECK(panel_called(data, "Heading error")["y"]["unit"] == "deg");
   CHECK(panel_called(data, "Points and matches")["curves"].size() == 4);

@@ -47,7 +47,8 @@ function drawCurve(plot, curve, count) {
   ctx.lineJoin = 'round';
   ctx.lineCap = 'round';
   // The truth lies below the estimate and still shows where the two agree.
-  ctx.lineWidth = (curve.dots ? 5 : curve.ink === 'truth' ? 4 : 1.8) * pixel;
+  const dot = curve.x.length > 100 ? 5 : 7; // a few are seen on a line as well
+  ctx.lineWidth = (curve.dots ? dot : curve.ink === 'truth' ? 4 : 1.8) * pixel;
   ctx.setLineDash(curve.dots || curve.filled ? [] : dashesOf(curve, count).map((length) => length * pixel));
   ctx.strokeStyle = colour(curve.ink);
   ctx.fillStyle = colour(curve.ink);
