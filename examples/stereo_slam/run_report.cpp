@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -257,7 +258,7 @@ example::LinePlot error_plot(const RunRecord& run, const TimeAxis& time, bool he
                          .y = {"error", heading ? "deg" : "m"},
                          .x_values = time.values,
                          .curves = {}};
-  const auto error = over_frames(run, [&](const FrameRecord& frame) {
+  auto error = over_frames(run, [&](const FrameRecord& frame) {
     if (!frame.truth) return gap;
     const FrameError e = frame_error(frame.T_world_camera, *frame.truth);
     return heading ? e.heading * degrees : e.position;
@@ -266,11 +267,17 @@ example::LinePlot error_plot(const RunRecord& run, const TimeAxis& time, bool he
     plot.caption = "This data has no truth: the error is not known.";
     return plot;
   }
-  const auto claimed = over_frames(run, [&](const FrameRecord& frame) {
+  auto claimed = over_frames(run, [&](const FrameRecord& frame) {
     const int first = heading ? 3 : 0;
     const double variance = frame.covariance.diagonal().segment<3>(first).sum();
     return variance > 0 ? 3.0 * std::sqrt(variance) * (heading ? degrees : 1.0) : gap;
   });
+  constexpr double small = 0.01;  // [m]; an axis of millimetres below it
+  if (!heading && std::ranges::none_of(error, [](double e) { return e > small; })) {
+    plot.y.unit = "mm";
+    for (std::vector<double>* const values : {&error, &claimed})
+      for (double& value : *values) value *= 1e3;
+  }
   plot.caption =
       "Distance from the truth, the first poses coinciding. 3 sigma: three standard deviations of the pose "
       "as "
@@ -383,8 +390,10 @@ example::Picture sample_picture(const RunRecord& run) {
   const std::optional<SampleFrame>& kept = run.newest ? run.newest : run.sample;
   if (!kept || kept->left.empty()) return picture;
   const SampleFrame& sample = *kept;
-  picture.caption = "Left image of frame " + std::to_string(sample.index) +
-                    ". A line leads from each point to where the right image shows it.";
+  picture.caption =
+      "Left image of frame " + std::to_string(sample.index) +
+      ". Lines lead to where the right image shows a point: of all that do not agree, and of one "
+      "of the others in each part of the image.";
   picture.png = example::png_bytes(sample.left);
   picture.width = sample.left.width();
   picture.height = sample.left.height();
@@ -392,10 +401,16 @@ example::Picture sample_picture(const RunRecord& run) {
   picture.marks = {{"new", Ink::measurement, {}, {}},
                    {"matched, but not where the pose says", Ink::wrong, {}, {}},
                    {"matched and agreed upon", Ink::belief, {}, {}}};
+  const double part = picture.width / 16.0;
+  std::set<std::array<int, 3>> drawn;  // part of the image, kind
   for (const SamplePoint& point : sample.points) {
-    example::Marks& marks = picture.marks[static_cast<std::size_t>(point.kind)];
+    const auto kind = static_cast<std::size_t>(point.kind);
+    example::Marks& marks = picture.marks[kind];
     marks.points.push_back({point.x, point.y});
-    marks.segments.push_back({point.x, point.y, point.right_x, point.right_y});
+    const std::array<int, 3> place{static_cast<int>(point.x / part), static_cast<int>(point.y / part),
+                                   static_cast<int>(kind)};
+    if (marks.ink == Ink::wrong || drawn.insert(place).second)
+      marks.segments.push_back({point.x, point.y, point.right_x, point.right_y});
   }
   return picture;
 }

@@ -157,6 +157,13 @@ TEST_CASE("report of a run: every panel of the main job is there") {
   const auto picture = panel_called(data, "One frame with its matches");
   CHECK(picture["png"].get<std::string>().starts_with("iVBORw0KGgo"));  // the signature of PNG
   CHECK(picture["marks"][1]["count"] == 90);                            // every tenth of 900
+  const auto lines = [&](int kind) {  // of 4 floats, three bytes in four letters
+    return picture["marks"][kind]["segments"].get<std::string>().size() * 3 / 4 / 16;
+  };
+  CHECK(lines(1) == 90);
+  CHECK(picture["marks"][2]["count"] > 400);
+  CHECK(lines(2) > 50);
+  CHECK(lines(2) < 200);  // one in a part of the image
 }
 
 TEST_CASE("report of a run: times and threads change nothing in it") {
