@@ -1,4 +1,4 @@
-# cmake --install, then a project finds cairn by its version and links two files that include every header.
+# cmake --install, then a project finds cairn by its version and links every header twice.
 include("${CMAKE_CURRENT_LIST_DIR}/steps.cmake")
 install_cairn()
 configure("${project}" "${work}/user" -D "CMAKE_PREFIX_PATH=${prefix}" -D "cairn_version=${version}"
