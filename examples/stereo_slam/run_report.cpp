@@ -230,9 +230,12 @@ example::PlanePlot path_plot(const RunRecord& run) {
     if (!frame.tracked || !frame.covariance.allFinite()) continue;
     const cairn::Matrix<3> R = frame.T_world_camera.rotation().matrix();
     const cairn::Matrix<3> spread = R * frame.covariance.topLeftCorner<3, 3>() * R.transpose();
-    known.push_back({{estimate(0), estimate(2)}, {spread(0, 0), spread(0, 2), spread(2, 2)}});
+    const std::array<double, 3> flat{spread(0, 0), spread(0, 2), spread(2, 2)};
+    if (flat[0] > 0 && flat[0] * flat[2] >= flat[1] * flat[1])  // a page is not lost for one that is none
+      known.push_back({{estimate(0), estimate(2)}, flat});
   }
-  for (const LoopClosure& loop : run.loops) add(met, run.frames[loop.frame].T_world_camera.translation());
+  for (const LoopClosure& loop : run.loops)
+    if (loop.frame < run.frames.size()) add(met, run.frames[loop.frame].T_world_camera.translation());
   const bool any_truth = std::any_of(run.frames.begin(), run.frames.end(),
                                      [](const FrameRecord& frame) { return frame.truth.has_value(); });
   if (any_truth)
