@@ -52,7 +52,6 @@ struct TruthErrors {
 
 struct Outcome {
   PathErrors estimate, dead_reckoning;
-  double sigma = 0;          ///< taken for the noise of a pixel [pixels]
   double pose_nees = 0;      ///< mean over all frames, of 6
   double located_nees = 0;   ///< over those that were located
   double landmark_nees = 0;  ///< mean over the dots at the end, of 3: each alone
@@ -66,6 +65,7 @@ struct Results {
   Outcome by_images;  ///< with the noise that the images show, against a truth that errs as it was seen to
   Outcome stated;     ///< with the noise that the record states, against a truth without an error
   TruthErrors truth;
+  double sigma = 0;             ///< of the images [pixels]
   cairn::RunningMoments shape;  ///< of records simulated with the images' noise
 };
 
@@ -147,7 +147,6 @@ public:
 
   /// From now on that is taken for the noise of a pixel.
   void assume(double sigma) {
-    sigma_ = sigma;
     for (std::vector<cairn::StereoSighting>& seen : sightings_)
       for (cairn::StereoSighting& s : seen) s.sigma = sigma;
   }
@@ -177,7 +176,6 @@ public:
     return result;
   }
 
-  [[nodiscard]] double sigma() const noexcept { return sigma_; }
   /// What the image of step k shows.
   [[nodiscard]] const std::vector<cairn::StereoSighting>& sightings(std::size_t k) const {
     return sightings_[k];
@@ -214,7 +212,7 @@ private:
 
   example::MatFile arrays_;
   SE3 T_vehicle_camera_;
-  double images_sigma_ = 0, sigma_ = 0;
+  double images_sigma_ = 0;
   std::vector<std::vector<cairn::StereoSighting>> sightings_{steps};
   std::vector<Vector<6>> velocities_{steps};
 };
@@ -294,19 +292,11 @@ private:
   cairn::RunningMoments position_, angle_;
 };
 
-/// A step of the world, at a point of it.
-Matrix<3, 6> moved_with_world(const Vector<3>& point) {
-  Matrix<3, 6> G;
-  G << Matrix<3>::Identity(), -cairn::skew(point);
-  return G;
-}
-
 /// Maps the dots of the record and follows the camera among them. What is believed is held against the truth
 /// of the pose and of the first, which says where the world is: both err, independently of each other here,
 /// by what is given.
 Outcome map_and_follow(const Record& record, const TruthErrors& of_truth = {}) {
   Outcome outcome;
-  outcome.sigma = record.sigma();
   while (record.sightings(outcome.first).size() < enough_for_a_pose) ++outcome.first;
   cairn::KeyframeMapOptions options;
   options.min_matches = enough_for_a_pose;
@@ -372,29 +362,23 @@ Outcome map_and_follow(const Record& record, const TruthErrors& of_truth = {}) {
   outcome.located_nees = located_nees.mean();
   outcome.keyframes = map.keyframe_count();
   cairn::RunningMoments squared, dot_nees;
-  std::vector<std::uint32_t> known_dots;
-  std::vector<double> errors;
-  std::vector<Matrix<3, 6>> world_moves;
-  for (const std::uint32_t dot : map.landmark_ids()) {
-    const auto known = map.landmark_in_world(dot);
-    if (!known) continue;
-    ++outcome.landmarks;
-    const Vector<3> error = T_camera_truth * record.true_dot(dot) - known->mean;
-    squared.add(error.squaredNorm());
-    const Matrix<3, 6> G = moved_with_world(known->mean);
-    const Matrix<3> due = known->covariance + G * of_truth.covariance * G.transpose();
-    if (const auto one = cairn::normalised_squared(error, cairn::symmetrised(due))) dot_nees.add(*one);
-    world_moves.push_back(G);
-    known_dots.push_back(dot);
-    errors.insert(errors.end(), error.begin(), error.end());
-  }
+  std::vector<std::uint32_t> known_dots = map.landmark_ids();
+  std::erase_if(known_dots, [&](std::uint32_t dot) { return !map.landmark_in_world(dot); });
+  outcome.landmarks = known_dots.size();
   if (const auto together = map.landmarks_in_world(known_dots)) {
-    const Vector<cairn::dynamic> error =
-        Eigen::Map<const Vector<cairn::dynamic>>(errors.data(), static_cast<Eigen::Index>(errors.size()));
-    Matrix<cairn::dynamic, 6> G(error.size(), 6);
-    for (std::size_t i = 0; i < world_moves.size(); ++i)
-      G.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = world_moves[i];
-    const Matrix<cairn::dynamic> due = together->covariance + G * of_truth.covariance * G.transpose();
+    const Matrix<cairn::dynamic, 6> G = cairn_bench::moved_with_world(together->mean, Vector<3>::Zero());
+    const Matrix<cairn::dynamic> due = cairn::symmetrised(
+        Matrix<cairn::dynamic>(together->covariance + G * of_truth.covariance * G.transpose()));
+    Vector<cairn::dynamic> error(together->mean.size());
+    Eigen::Index at = 0;
+    for (const std::uint32_t dot : known_dots) {
+      const Vector<3> one = T_camera_truth * record.true_dot(dot) - together->mean.segment<3>(at);
+      squared.add(one.squaredNorm());
+      if (const auto nees_of_one = cairn::normalised_squared(one, Matrix<3>(due.block<3, 3>(at, at))))
+        dot_nees.add(*nees_of_one);
+      error.segment<3>(at) = one;
+      at += 3;
+    }
     if (const auto all = cairn::normalised_squared(error, due))
       outcome.map_nees = *all / static_cast<double>(known_dots.size());
     if (const auto apart = cairn_bench::shape_nees(together->mean, error, together->covariance))
@@ -413,7 +397,8 @@ std::optional<Results> run() {
   Results results;
   results.stated = map_and_follow(record);
   results.truth = record.errors_of_truth();
-  record.assume(record.images_sigma());
+  results.sigma = record.images_sigma();
+  record.assume(results.sigma);
   results.by_images = map_and_follow(record, results.truth);
   // A NEES is what it should be where its mean over these is, and of one record no further off than they are.
   constexpr std::uint64_t runs = 40;
@@ -467,7 +452,8 @@ void add_starry_night_rows(cairn_bench::Scoreboard& board) {
        .better = cairn_bench::larger,
        .note = path_note(seen) + " from step " + std::to_string(seen.first + 1) + ", " +
                std::to_string(seen.located) + " of " + std::to_string(seen.frames) +
-               " frames located; sigma " + text(seen.sigma) + " pixels by the heights in both images"},
+               " frames located; sigma " + text(results ? results->sigma : 0) +
+               " pixels by the heights in both images"},
       seen.dead_reckoning.position / seen.estimate.position);
   add({.name = "attitude better than dead reckoning",
        .unit = "times",

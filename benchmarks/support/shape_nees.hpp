@@ -25,6 +25,16 @@ struct ShapeNees {
   double frame = 0;  ///< by how much NEES is more where the frame is held, of 6
 };
 
+/// By how much points, three numbers each, move with a step of the world about a centre: G of (1), 3 n x 6.
+[[nodiscard]] inline cairn::Matrix<cairn::dynamic, 6> moved_with_world(
+    const cairn::Vector<cairn::dynamic>& points, const cairn::Vector<3>& centre) {
+  cairn::Matrix<cairn::dynamic, 6> G(points.size(), 6);
+  for (Eigen::Index i = 0; i < points.size(); i += 3)
+    G.middleRows<3>(i) << cairn::Matrix<3>::Identity(),
+        -cairn::skew(cairn::Vector<3>(points.segment<3>(i) - centre));
+  return G;
+}
+
 /// Of n points, three numbers each: where they are believed to be and their errors [m], their joint
 /// covariance [m^2]. Nothing where the points lie on a line, so that some turn moves none of them, or P is
 /// not positive definite. O(n^3).
@@ -35,12 +45,9 @@ struct ShapeNees {
   const Eigen::Index numbers = points.size();
   CAIRN_EXPECTS(numbers % 3 == 0 && errors.size() == numbers && P.rows() == numbers && P.cols() == numbers,
                 "shape_nees: expected three numbers a point, and a covariance of all");
-  cairn::Matrix<dynamic, 6> G(numbers, 6);
-  for (Eigen::Index i = 0; i < numbers; i += 3)
-    G.middleRows<3>(i) << cairn::Matrix<3>::Identity(),
-        -cairn::skew(cairn::Vector<3>(points.segment<3>(i) - points.head<3>()));
   const cairn::Cholesky<dynamic> factor(P);
   if (numbers == 0 || !factor.good()) return std::nullopt;
+  const cairn::Matrix<dynamic, 6> G = moved_with_world(points, points.head<3>());
   const cairn::Matrix<dynamic, 6> W = factor.whiten(G);
   const cairn::Vector<dynamic> w = factor.whiten(errors);
   const cairn::Cholesky<6> information(cairn::Matrix<6>(W.transpose() * W));
