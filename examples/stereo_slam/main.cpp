@@ -149,9 +149,13 @@ void define(CLI::App& app, Arguments& arguments, std::vector<std::string>& datas
   app.add_flag("--there-and-back", arguments.there_and_back,
                "the frames forwards, then backwards: how far from its start does the drive end?");
   app.add_flag("!--no-cache", arguments.dataset.arena.cache, "arena: do not keep rendered images on disk");
-  app.add_option("--live", arguments.live,
-                 "serve the report while it grows at this port of 127.0.0.1, for a browser; 0 = any free one")
+  app.add_option(
+         "--live", arguments.live,
+         "serve the report while it grows to a browser of this machine, at this port of 127.0.0.1; without "
+         "one, or 0: any free one")
       ->check(example::whole_number(0, 65535))
+      ->expected(0, 1)
+      ->default_str("0")
       ->type_name("PORT");
   app.add_option("--save", arguments.save_map, "write the map for another run into FILE")->type_name("FILE");
   app.add_option("--save-rig", arguments.save_rig,

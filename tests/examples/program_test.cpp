@@ -567,6 +567,9 @@ TEST_SUITE("program") {
     CHECK(watched.says(address));
     CHECK_FALSE(growing.empty());
     CHECK(finished == cairn::read_file(folder / "out watched" / "report.html"));
+    const Outcome anywhere = run("--live --frames 2 --out \"" + (folder / "anywhere").string() + "\"");
+    CHECK(anywhere.code == 0);
+    CHECK(anywhere.says("live report: http://127.0.0.1:"));
     cairn_test::check_same_bytes(folder / "out alone", folder / "out watched", results());
   }
 }
