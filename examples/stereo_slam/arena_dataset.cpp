@@ -73,6 +73,7 @@ public:
     frame.time = static_cast<double>(i) / frames_a_second;
     frame.name = name() + " frame " + std::to_string(i);
     frame.truth = left_camera_pose(stances_[i], options_.baseline);
+    frame.truth_world = "arena";
     std::optional<ImagePair> pair = cache_.find(i);
     if (!pair) {
       pair = take(i, *frame.truth);

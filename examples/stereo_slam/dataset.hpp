@@ -27,8 +27,9 @@ struct StereoFrame {
   cairn::Image left;
   cairn::Image right;
   std::optional<cairn::SE3>
-      truth;         ///< T_world_left of the left camera of rig(), in a world of the data's own
-  std::string name;  ///< for messages
+      truth;                ///< T_world_left of the left camera of rig(), in a world of the data's own
+  std::string truth_world;  ///< which world that is: by the same name, the same one; by none, no other's
+  std::string name;         ///< for messages
 };
 
 /// A sequence of stereo frames from one rig.

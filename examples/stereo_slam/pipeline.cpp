@@ -131,8 +131,10 @@ Pipeline::Pipeline(const cairn::StereoRig& rig, const PipelineOptions& options, 
   map_ = std::move(known.map);
   noise_factors_ = NoiseFactors(map_.pixel_factor(), map_.pose_factor());
   step_ = known.steps;
+  truth_ = std::move(known.truth);
   for (Landmark& landmark : known.landmarks) {
-    landmark.id = store_->add({landmark.descriptor, landmark.sign});
+    const LandmarkId id = store_->add({landmark.descriptor, landmark.sign});
+    CAIRN_EXPECTS(id == landmark.id, "the landmarks of a saved map are numbered 0, 1, 2, ...");
     store_->trust(landmark.id);
     landmarks_.add(std::move(landmark));
   }
@@ -240,10 +242,7 @@ void Pipeline::work_on(const StereoFrame& frame, const FramePoints& points, Fram
       follow(frame, result);
   });
   if (const auto note = riding_along_->close_frame(result.index)) record_.notes.push_back(*note);
-  if (frame.truth && (T_truth_world_ || !lost_)) {
-    if (!T_truth_world_) T_truth_world_ = *frame.truth * T_world_camera_.inverse();
-    result.truth = T_truth_world_->inverse() * *frame.truth;
-  }
+  result.truth = truth_in_map(frame, result.tracked);
   result.points_left = static_cast<int>(points.left.size());
   result.points_right = static_cast<int>(points.right.size());
   result.stereo_matches = static_cast<int>(locals_.size());
@@ -256,6 +255,22 @@ void Pipeline::work_on(const StereoFrame& frame, const FramePoints& points, Fram
     result.T_world_reference = map_.keyframe_pose(result.reference).value_or(cairn::SE3());
   }
   ++step_;
+}
+
+/// Where the frame is in truth. Where the map lies in that world it knows of the frame that it began with; in
+/// another world it lies as the first pose that is found says.
+std::optional<cairn::SE3> Pipeline::truth_in_map(const StereoFrame& frame, bool tracked) {
+  if (!frame.truth) return std::nullopt;
+  if (!truth_ || truth_->name != frame.truth_world) {
+    if (!tracked) return std::nullopt;
+    truth_ = {frame.truth_world, *frame.truth * T_world_camera_.inverse()};
+    record_.truth_laid_on_estimate = pose_covariance_.diagonal().maxCoeff() > gauge_variance;
+    if (record_.truth_laid_on_estimate)
+      record_.notes.push_back(frame.name +
+                              ": the truth is in a world that the map does not know and is laid on the pose "
+                              "estimated here, whose error is in all others: no NEES");
+  }
+  return truth_->T_truth_map.inverse() * *frame.truth;
 }
 
 /// Takes the right camera to be pitched as its rows are; false where they are as the rig says.
@@ -932,13 +947,16 @@ SampleFrame Pipeline::sample_of(const StereoFrame& frame, const std::vector<Matc
 }
 
 SavedMap Pipeline::map() const {
-  SavedMap saved{options_.features, options_.oriented, step_, map_, {}};
+  SavedMap saved{options_.features, options_.oriented, step_, map_, {}, std::nullopt};
   for (const Landmark& landmark : landmarks_.all())
     if (store_->is_base(landmark.id) && map_.contains(landmark.id))
       saved.landmarks.push_back(landmark);
     else
       static_cast<void>(saved.map.forget(landmark.id));
   std::ranges::sort(saved.landmarks, {}, &Landmark::id);
+  saved.map.renumber();
+  for (std::size_t i = 0; i < saved.landmarks.size(); ++i) saved.landmarks[i].id = static_cast<LandmarkId>(i);
+  if (truth_ && !truth_->name.empty() && !record_.truth_laid_on_estimate) saved.truth = truth_;
   return saved;
 }
 

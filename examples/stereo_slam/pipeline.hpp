@@ -188,6 +188,7 @@ private:
   [[nodiscard]] std::optional<std::string> of_two_moments(const StereoFrame& frame);
   bool level_rig(const StereoFrame& frame, const FramePoints& points, std::span<const PointPair> pairs);
   void begin(const StereoFrame& frame, FrameRecord& result);
+  [[nodiscard]] std::optional<cairn::SE3> truth_in_map(const StereoFrame& frame, bool tracked);
   void choose_calibration();
   void watch_rig();
   void follow_rig(const std::string& why);
@@ -264,7 +265,7 @@ private:
   cairn::SE3 T_world_camera_;
   cairn::SE3 T_last_camera_;  // motion of the last step, for the prediction
   cairn::Matrix<6> pose_covariance_;
-  std::optional<cairn::SE3> T_truth_world_;  // from this run's world to the truth's
+  std::optional<TruthWorld> truth_;
   int step_ = 0;
   RunRecord record_;
 };

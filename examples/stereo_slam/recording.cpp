@@ -55,6 +55,7 @@ public:
     frame.left = read_sized(recorded.left, recording_.rig.left);
     frame.right = read_sized(recorded.right, recording_.rig.right);
     frame.truth = recorded.truth;
+    frame.truth_world = recording_.name;
     frame.name = recorded.left.filename().string();
     return frame;
   }

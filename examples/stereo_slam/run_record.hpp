@@ -28,6 +28,9 @@ enum class Stage { load, detect, stereo, match, pose, update, store, total };
 inline constexpr std::array<const char*, 8> stage_names{"load", "detect", "stereo", "match",
                                                         "pose", "update", "store",  "total"};
 
+/// Variances up to this are those of the frame with which a map begins, which is where its world is.
+inline constexpr double gauge_variance = 2e-12;
+
 struct FrameRecord {
   std::size_t index = 0;            ///< frame number in the data set
   double time = 0;                  ///< [s]
@@ -122,7 +125,10 @@ struct RunRecord {
   std::size_t refused = 0;            ///< poses that the motion could not lead to
   std::size_t merged = 0;             ///< landmarks that were another's twin
   std::size_t aged = 0;               ///< landmarks that were not found where they should be
-  double variance_factor = 1;         ///< by which variances are larger than the pixel sigma says, at the end
+  /// The world of the truth was laid on a pose that was estimated: the error of that one is in all errors,
+  /// and no covariance knows of it.
+  bool truth_laid_on_estimate = false;
+  double variance_factor = 1;  ///< by which variances are larger than the pixel sigma says, at the end
   std::optional<SampleFrame> sample;
   std::optional<SampleFrame> newest;       ///< the last frame, where it was asked for
   std::vector<std::string> notes;          ///< what the reader should know: skipped frames, lost frames

@@ -58,7 +58,7 @@ std::array<float, 3> upright(const cairn::Vector<3>& p) {
   return {static_cast<float>(p(0)), static_cast<float>(p(2)), static_cast<float>(-p(1))};
 }
 
-void add_figures(example::Report& report, const Summary& summary) {
+void add_figures(example::Report& report, const RunRecord& run, const Summary& summary) {
   using Verdict = example::KeyFigure::Verdict;
   using example::readable;
   const auto length = [&](const char* name, double metres, std::string note) {
@@ -90,7 +90,8 @@ void add_figures(example::Report& report, const Summary& summary) {
   const std::string share =
       summary.path > 0 ? readable(100.0 * errors.end / summary.path) + " % of the path" : "";
   length("end error", errors.end, share);
-  length("max position error", errors.largest.position, "first poses coincide");
+  length("max position error", errors.largest.position,
+         run.truth_laid_on_estimate ? "the first pose found coincides" : "the map's first frame coincides");
   report.figure({"max heading error", readable(errors.largest.heading * degrees), "deg",
                  "angle of the whole rotation"});
   length("ATE", errors.ate_rmse, "RMSE of positions, alignment: " + errors.ate_alignment);
@@ -431,7 +432,7 @@ std::string subtitle_of(const RunRecord& run, const Summary& summary) {
 
 example::Report run_report(const RunRecord& run, const Summary& summary) {
   example::Report report("Stereo SLAM: " + run.dataset, subtitle_of(run, summary));
-  add_figures(report, summary);
+  add_figures(report, run, summary);
   if (run.ended_early) report.note(*run.ended_early);
   if (summary.budget) report.note(budget_text(*summary.budget));
   for (const std::string& note : run.notes) report.note(note);

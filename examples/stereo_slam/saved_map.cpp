@@ -77,6 +77,25 @@ Landmark get_landmark(cairn::BinaryReader& in, LandmarkId id, int dimension, con
   return landmark;
 }
 
+void put(cairn::BinaryWriter& out, const TruthWorld& truth) {
+  out.put(static_cast<std::uint32_t>(truth.name.size()));
+  for (const char letter : truth.name) out.put(letter);
+  const cairn::SO3& r = truth.T_truth_map.rotation();
+  for (const double number : {r.w(), r.x(), r.y(), r.z()}) out.put(number);
+  for (int i = 0; i < 3; ++i) out.put(truth.T_truth_map.translation()(i));
+}
+
+TruthWorld get_truth(cairn::BinaryReader& in) {
+  TruthWorld truth;
+  const std::size_t letters = in.count<std::uint32_t>(sizeof(char));
+  for (std::size_t i = 0; i < letters; ++i) truth.name.push_back(in.get<char>());
+  const double w = in.finite(), x = in.finite(), y = in.finite(), z = in.finite();
+  cairn::Vector<3> translation;
+  for (int i = 0; i < 3; ++i) translation(i) = in.finite();
+  truth.T_truth_map = {cairn::SO3::from_quaternion(w, x, y, z), translation};
+  return truth;
+}
+
 bool same(const cairn::PinholeCamera& a, const cairn::PinholeCamera& b) {
   const cairn::PinholeParameters &p = a.parameters(), &q = b.parameters();
   return p.fx == q.fx && p.fy == q.fy && p.cx == q.cx && p.cy == q.cy && p.k1 == q.k1 && p.k2 == q.k2 &&
@@ -93,6 +112,8 @@ void save_map(const std::filesystem::path& path, const SavedMap& saved) {
   cairn::save_keyframe_map(out, saved.map);
   const auto keyframes = numbers_in_file(saved.map);
   for (const Landmark& landmark : saved.landmarks) put(out, landmark, keyframes);
+  out.put(static_cast<std::uint8_t>(saved.truth.has_value()));
+  if (saved.truth) put(out, *saved.truth);
   cairn::write_file_atomically(path, std::move(out).file(file_kind, saved_map_version));
 }
 
@@ -108,6 +129,7 @@ SavedMap load_map(const std::filesystem::path& path) {
   for (std::size_t i = 0; i < count; ++i)
     saved.landmarks.push_back(
         get_landmark(in, static_cast<LandmarkId>(i), dimension_of(saved.features), saved.map));
+  if (in.get<std::uint8_t>() != 0) saved.truth = get_truth(in);
   in.expect_end();
   return saved;
 }

@@ -45,6 +45,7 @@ double path_length(const RunRecord& run) {
 }
 
 std::optional<PoseConsistency> consistency_of(const RunRecord& run) {
+  if (run.truth_laid_on_estimate) return std::nullopt;
   const double limit = cairn::chi_square_quantile(0.999, 6);
   PoseConsistency result;
   for (const FrameRecord& frame : run.frames)
@@ -192,8 +193,7 @@ FrameError frame_error(const cairn::SE3& estimate, const cairn::SE3& truth) {
 }
 
 std::optional<double> pose_nees(const FrameRecord& frame) {
-  constexpr double gauge = 2e-12;  // variance; the first keyframe's is 1e-12
-  if (!frame.truth || !frame.tracked || !(frame.covariance.diagonal().minCoeff() > gauge))
+  if (!frame.truth || !frame.tracked || !(frame.covariance.diagonal().minCoeff() > gauge_variance))
     return std::nullopt;
   return cairn::normalised_squared(cairn::local(frame.T_world_camera, *frame.truth), frame.covariance);
 }

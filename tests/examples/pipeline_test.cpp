@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,7 @@
 
 #include "arena_dataset.hpp"
 #include "saved_map.hpp"
+#include "summary.hpp"
 #include "support/data.hpp"
 #include "support/folder.hpp"
 
@@ -489,9 +491,53 @@ TEST_SUITE("pipeline") {
       CHECK(after.map.keyframe_count() == before.map.keyframe_count());
       CHECK(after.map.landmark_ids() == before.map.landmark_ids());
     }
+    // As it is in memory, without a file, it is the same map.
+    stereo_slam::Pipeline at_once(rig(), with, mapping.map(), "map");
+    CHECK(at_once.step(drive()[4]).tracked);
+    CHECK((at_once.record().frames[0].T_world_camera.translation() -
+           made.frames[4].T_world_camera.translation())
+              .norm() < 0.01);
     stereo_slam::Pipeline going_on(rig(), options(), stereo_slam::load_map(folder / "map"), "map");
     for (const StereoFrame& frame : drive()) CHECK(going_on.step(frame).tracked);
     CHECK(going_on.map().steps == 2 * static_cast<int>(drive().size()));
+  }
+
+  TEST_CASE("pipeline: a map knows where it lies in the world of its truth; in another no NEES is claimed") {
+    stereo_slam::Pipeline mapping(rig(), options());
+    CHECK_FALSE(mapping.step(black(drive()[0])).tracked);
+    for (std::size_t i = 1; i < 10; ++i) mapping.step(drive()[i]);
+    const RunRecord made = mapping.record();
+    CHECK_FALSE(made.frames[0].truth);  // the world begins with the frame after
+    CHECK(cairn::local(*made.frames[1].truth, made.frames[1].T_world_camera).norm() < 1e-12);
+    CHECK(stereo_slam::summarise(made).errors->consistency);
+    const stereo_slam::SavedMap map = mapping.map();
+    REQUIRE(map.truth);
+    CHECK(map.truth->name == "arena");
+    CHECK(map.truth->T_truth_map.matrix() == drive()[1].truth->matrix());
+
+    PipelineOptions with = options();
+    with.localise = true;
+    const auto localise = [&](const std::string& world) {
+      stereo_slam::Pipeline pipeline(rig(), with, map, "map");
+      for (StereoFrame frame : {drive()[6], drive()[8]}) {
+        frame.truth_world = world;
+        pipeline.step(frame);
+      }
+      const std::optional<stereo_slam::TruthWorld> known = pipeline.map().truth;
+      CHECK(known.has_value() == (world == "arena"));
+      return pipeline.record();
+    };
+    const RunRecord known = localise("arena"), other = localise("another");
+    for (const std::size_t i : {std::size_t{0}, std::size_t{1}})
+      CHECK(known.frames[i].truth->matrix() == made.frames[6 + 2 * i].truth->matrix());
+    CHECK_FALSE(known.truth_laid_on_estimate);
+    CHECK(known.notes.empty());
+    CHECK(stereo_slam::summarise(known).errors->consistency);
+    CHECK(cairn::local(*other.frames[0].truth, other.frames[0].T_world_camera).norm() < 1e-12);
+    CHECK(other.truth_laid_on_estimate);
+    REQUIRE(other.notes.size() == 1);
+    CHECK(other.notes[0].find("in a world that the map does not know") != std::string::npos);
+    CHECK_FALSE(stereo_slam::summarise(other).errors->consistency);
   }
 
   TEST_CASE("pipeline: a map of another rig, or of other points, is refused in words") {

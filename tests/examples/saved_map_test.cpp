@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include <doctest/doctest.h>
@@ -13,6 +14,7 @@
 #include <cairn/core/check.hpp>
 #include <cairn/io/binary_file.hpp>
 #include <cairn/io/file.hpp>
+#include <cairn/manifold/se3.hpp>
 
 #include "slam/simulated_arena.hpp"
 #include "support/folder.hpp"
@@ -25,7 +27,7 @@ using stereo_slam::SavedMap;
 SavedMap map_of_a_frame() {
   cairn::KeyframeMap map(cairn_test::arena_rig());
   map.begin(cairn::SE3());
-  SavedMap saved{stereo_slam::FeatureKind::surf, true, 5, map, {}};
+  SavedMap saved{stereo_slam::FeatureKind::surf, true, 5, map, {}, std::nullopt};
   const auto frames = cairn_test::arena_frames({.frames = 1});
   for (const cairn::StereoSighting& s : frames[0].sightings) {
     if (!saved.map.add_landmark(s)) continue;
@@ -63,15 +65,22 @@ TEST_SUITE("saved_map") {
       CHECK(map.landmarks.size() == 6);
       CHECK(static_cast<bool>(map.landmarks.front().patch));
       CHECK(map.map.rig_correction().has_value() == (name == std::string("rig_1")));
+      CHECK(map.truth.has_value() == (name == std::string("rig_1")));
     }
   }
 
   TEST_CASE("saved_map: everything is there again, landmarks numbered in their order") {
     const cairn_test::Folder folder;
-    const SavedMap saved = map_of_a_frame();
+    SavedMap saved = map_of_a_frame();
     REQUIRE(saved.landmarks.size() > 100);
     stereo_slam::save_map(folder / "map", saved);
+    CHECK_FALSE(stereo_slam::load_map(folder / "map").truth);
+    saved.truth = {"a world", cairn::SE3::exp((cairn::Vector<6>() << 1, -2, 3, 0.1, 0.2, -0.3).finished())};
+    stereo_slam::save_map(folder / "map", saved);
     const SavedMap loaded = stereo_slam::load_map(folder / "map");
+    REQUIRE(loaded.truth);
+    CHECK(loaded.truth->name == "a world");
+    CHECK(cairn::local(loaded.truth->T_truth_map, saved.truth->T_truth_map).norm() < 1e-12);
     CHECK(loaded.features == saved.features);
     CHECK(loaded.oriented);
     CHECK(loaded.steps == 5);

@@ -116,6 +116,11 @@ TEST_CASE(
   CHECK(json["pose_nees_mean"].get<double>() == Approx((27 * 6 + 24 + 10 * 100) / 38.0));
   CHECK(json["pose_nees_above_999"].get<double>() == Approx(11 / 38.0));
   CHECK(json["keyframes"] == 12);
+  run.truth_laid_on_estimate = true;  // whose error no covariance knows of
+  CHECK(json_of(run)["pose_nees_mean"].is_null());
+  CHECK(json_of(run)["pose_nees_above_999"].is_null());
+  CHECK(json_of(run)["max_position_error_m"].is_number());
+  run.truth_laid_on_estimate = false;
   for (auto& frame : run.frames) frame.truth.reset();
   CHECK(json_of(run)["pose_nees_mean"].is_null());
 }

@@ -137,6 +137,32 @@ TEST_SUITE("keyframe_map_file") {
     }
   }
 
+  TEST_CASE("keyframe_map: renumbered it is the map that its file is, with the keyframes that left") {
+    const auto frames = cairn_test::arena_frames({.frames = 60});
+    KeyframeMapOptions options;
+    options.max_keyframes = 6;
+    KeyframeMap map = arena_map(frames, options);
+    map.forget(map.landmark_ids()[3]);
+    const std::vector<std::uint32_t> ids = map.landmark_ids();
+    const std::string file = file_of(map);
+    KeyframeMap renumbered = map;
+    renumbered.renumber();
+    CHECK(file_of(renumbered) == file);
+    CHECK(renumbered.keyframes_added() == map.keyframes_added());
+    REQUIRE(renumbered.landmark_ids().size() == ids.size());
+    CHECK(renumbered.landmark_ids().back() + 1 == ids.size());
+    std::vector<std::uint32_t> beside = map.seen_with(std::span(ids).first(1));
+    for (std::uint32_t& id : beside)
+      id = static_cast<std::uint32_t>(std::ranges::lower_bound(ids, id) - ids.begin());
+    CHECK(renumbered.seen_with(std::vector<std::uint32_t>{0}) == beside);
+    for (std::uint32_t i = 0; i < ids.size(); ++i) {
+      const auto was = map.sightings_of(ids[i]), is = renumbered.sightings_of(i);
+      REQUIRE(is.size() == was.size());
+      CHECK(is.front().keyframe == was.front().keyframe);
+      CHECK(is.front().sighting.left == was.front().sighting.left);
+    }
+  }
+
   TEST_CASE("keyframe_map_file: an empty map, and one that has only begun") {
     KeyframeMap map(cairn_test::arena_rig());
     CHECK(map_of(file_of(map)).empty());

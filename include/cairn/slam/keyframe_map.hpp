@@ -330,6 +330,25 @@ public:
     return true;
   }
 
+  /// Numbers the landmarks 0, 1, 2, ... in the ascending order of their ids, as a file does. Those that
+  /// take_dropped() would return are forgotten with their numbers. O(landmarks log landmarks).
+  void renumber() {
+    std::ranges::sort(landmarks_, {}, &detail::KeyframeLandmark::id);
+    std::unordered_map<std::uint32_t, std::uint32_t> number;
+    for (detail::KeyframeLandmark& one : landmarks_) {
+      const auto next = static_cast<std::uint32_t>(number.size());
+      number[one.id] = next;
+      one.id = next;
+    }
+    place_.clear();
+    for (std::size_t i = 0; i < landmarks_.size(); ++i) place_[landmarks_[i].id] = i;
+    for (Keyframe& keyframe : keyframes_) {
+      std::erase_if(keyframe.saw, [&](std::uint32_t id) { return !number.contains(id); });
+      for (std::uint32_t& id : keyframe.saw) id = number[id];
+    }
+    dropped_.clear();
+  }
+
   /// The landmarks that the map itself took out since this was last asked: contradicted, spent, or without a
   /// keyframe.
   [[nodiscard]] std::vector<std::uint32_t> take_dropped() { return std::exchange(dropped_, {}); }
