@@ -15,6 +15,7 @@
 #include <ctime>
 #include <filesystem>
 #include <iostream>
+#include <limits>
 #include <optional>
 #include <string>
 #include <utility>
@@ -226,7 +227,9 @@ void add_loaded_rows(Scoreboard& board) {
     each += (each.empty() ? "" : "; ") + std::string(one.script) + " in " + one.map +
             (one.localise ? "" : ", going on");
     for (std::uint64_t seed = 1; seed <= seeds(); ++seed) {
-      nees.push_back(nees_of(one, seed, lost));
+      const double found = nees_of(one, seed, lost);
+      nees.push_back(std::isnan(found) ? std::numeric_limits<double>::infinity()
+                                       : found);  // never found: no pass
       each += ' ' + cairn::shortest(std::round(10 * nees.back()) / 10);
     }
   }
